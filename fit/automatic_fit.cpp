@@ -494,7 +494,8 @@ bool AutomaticFit::run_graded() {
   target_.sample(0);
   const ClosestPoint fitted(refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh))));
   std::vector<Vec3> places = missed_points(target_.surface, fitted, options_.max_tolerance_percent / 100);
-  const std::vector<Vec3> lost = missed_feature_points(features_, fitted, kLostShare);
+  const std::vector<Vec3> lost =
+      missed_feature_points(features_of_size(features_, kLostFeaturePercent / 100), fitted, kLostShare);
   places.insert(places.end(), lost.begin(), lost.end());
   for (const Fault& fault : faults_of_best())
     for (const Index c : fault) places.push_back(center_of(result_.mesh, c));

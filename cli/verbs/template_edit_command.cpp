@@ -2,6 +2,7 @@
 // The verbs under `template` that make or edit a mesh by hand: grid, carve, extrude, pillow, refine, collapse, merge,
 // split.
 
+#include "cli/runs/check_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/losses.h"
@@ -11,8 +12,10 @@
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/shell/extrude.h"
 #include "subvol/templates/carve.h"
 #include "subvol/templates/cell_split.h"
@@ -117,9 +120,14 @@ VolumeMesh make_extruded(EditArguments& arguments) {
 VolumeMesh make_collapsed(EditArguments& arguments) {
   const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   const Index a = arguments.vertices[0], b = arguments.vertices[1];
-  return arguments.what == "edge"   ? collapse_edge(mesh, a, b)
-         : arguments.what == "face" ? collapse_face(mesh, a, b)
-                                    : collapse_sheet(mesh, a, b);
+  VolumeMesh result = arguments.what == "edge"   ? collapse_edge(mesh, a, b)
+                      : arguments.what == "face" ? collapse_face(mesh, a, b)
+                                                 : collapse_sheet(mesh, a, b);
+  if (internal::region_references(mesh).size() > 1)
+    for (std::string& warning :
+         warnings_of_volumes(measure_regions(result, nullptr), measure_regions(mesh, nullptr), "input"))
+      arguments.warnings.push_back(std::move(warning));
+  return result;
 }
 
 /// Warns of names that both of two meshes have, and of names that get another number beside those of the first.

@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/templates/template_edit.h"
 #include "subvol/templates/vertex_merge.h"
 
@@ -49,11 +50,31 @@ Edge across(std::span<const Index> quad, Index a, Index b) {
   return {kNoIndex, kNoIndex};
 }
 
-/// Position of the vertex that two merged ones become: that of the one on the boundary if only one of them is there,
-/// else `otherwise`.
-Vec3 merged_place(const VolumeMesh& mesh, const MeshTopology& topology, Index a, Index b, const Vec3& otherwise) {
-  const bool a_outside = topology.is_boundary_vertex(a), b_outside = topology.is_boundary_vertex(b);
-  return a_outside == b_outside ? otherwise : mesh.positions[a_outside ? a : b];
+/// Tells which vertices stay where they are if others are merged into them.
+class Holds {
+ public:
+  Holds(const VolumeMesh& mesh, const MeshTopology& topology)
+      : topology_(topology), interfaces_(mark_interfaces(topology, find_interfaces(mesh, topology))) {}
+  /// Returns the number of sheets that hold a vertex: the boundary, and interfaces between regions.
+  int count(Index v) const { return int{topology_.is_boundary_vertex(v)} + int{interfaces_.has_vertex(v)}; }
+
+ private:
+  const MeshTopology& topology_;
+  InterfaceMarks interfaces_;
+};
+
+/// Position of the vertex that two merged ones become: that of the one that more sheets hold, or else `otherwise`.
+Vec3 merged_place(const VolumeMesh& mesh, const Holds& holds, Index a, Index b, const Vec3& otherwise) {
+  const int of_a = holds.count(a), of_b = holds.count(b);
+  return of_a == of_b ? otherwise : mesh.positions[of_a > of_b ? a : b];
+}
+
+/// Throws InputError if a region of a mesh is not in a result. name: of the operation.
+void require_regions_of(const VolumeMesh& mesh, const VolumeMesh& result, const std::string& name) {
+  const std::vector<int> left = region_references(result);
+  for (const int reference : region_references(mesh))
+    if (!std::ranges::binary_search(left, reference))
+      throw InputError(name + ": no cell of " + region_label(mesh, reference) + " would be left");
 }
 
 /// Merges pairs of vertices, each pair into its first vertex.
@@ -66,16 +87,19 @@ VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std
     while (target[v] != v) v = target[v];
     return v;
   };
+  const Holds holds(mesh, topology);
   for (const Edge& pair : pairs) {
     const Vec3 otherwise =
         half_way ? Vec3((mesh.positions[pair[0]] + mesh.positions[pair[1]]) / 2) : mesh.positions[pair[0]];
     const Index a = root(pair[0]), b = root(pair[1]);
     if (a == b) continue;
     target[b] = a;
-    moved.positions[a] = merged_place(mesh, topology, pair[0], pair[1], otherwise);
+    moved.positions[a] = merged_place(mesh, holds, pair[0], pair[1], otherwise);
   }
   for (std::size_t v = 0; v < target.size(); ++v) target[v] = root(static_cast<Index>(v));
-  return merge_vertices(moved, target, name);
+  VolumeMesh result = merge_vertices(moved, target, name);
+  require_regions_of(mesh, result, name);
+  return result;
 }
 
 /// One corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and true if the corner is

@@ -30,20 +30,20 @@ std::vector<std::array<Index, 2>> sheet_edges(const MeshTopology& topology, Inde
 /// mesh.
 VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts = 2);
 
-/// Removes the cells of a sheet: every edge shrinks to its end on the side of v0, or to its other end if only that one
-/// is on the boundary. `collapse_sheet(m, a, n)` undoes a `split_sheet(m, a, b)` that put n between a and b.
-/// InputError: as `sheet_edges`; an invalid mesh; a result that `merge_vertices` refuses.
+/// Removes the cells of a sheet: every edge shrinks to its end on the side of v0, or to its other end if the boundary
+/// or an interface between regions holds only that one, or both hold it. `collapse_sheet(m, a, n)` undoes a
+/// `split_sheet(m, a, b)` that put n between a and b.
+/// InputError: as `sheet_edges`; an invalid mesh; a result that `merge_vertices` refuses, or without a region.
 VolumeMesh collapse_sheet(const VolumeMesh& mesh, Index v0, Index v1);
 
-/// Shrinks one edge to its midpoint, or to its end on the boundary if only one end is there. The tets around the edge
-/// disappear; in a mesh of hexes, only a whole sheet can be collapsed. InputError: no such edge; an invalid mesh; a
-/// result that `merge_vertices` refuses.
+/// Shrinks one edge to its midpoint, or to one end as `collapse_sheet`. The tets around the edge disappear; in a mesh
+/// of hexes, only a whole sheet can be collapsed. InputError: no such edge; an invalid mesh; a result as for
+/// `collapse_sheet`.
 VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1);
 
-/// Folds a quad shut by joining its opposite corners v0 and v2 halfway (or on the boundary if only one of them is
-/// there), and with it all quads opposite to it through hexes: a whole column of hexes disappears. InputError: no such
-/// face; an invalid mesh; a column that meets cells other than hexes, or crosses itself; a result that `merge_vertices`
-/// refuses.
+/// Folds a quad shut by joining its opposite corners v0 and v2 halfway, or at one of them as `collapse_sheet`, and with
+/// it all quads opposite to it through hexes: a whole column of hexes disappears. InputError: no such face; an invalid
+/// mesh; a column that meets cells other than hexes, or crosses itself; a result as for `collapse_sheet`.
 VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2);
 
 }  // namespace subvol

@@ -3,6 +3,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "tests/support/region_fixtures.h"
+#include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
 
 #include <catch2/catch.hpp>

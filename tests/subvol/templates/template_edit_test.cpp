@@ -115,6 +115,23 @@ TEST_CASE("A pillow around some cells, and of prisms and tets", "[templates]") {
   CHECK_THROWS_AS(pillow(lattice, std::array<Index, 2>{0, 13}), InputError);  // they touch at a vertex
 }
 
+TEST_CASE("Collapsing a sheet moves no interface between regions and removes no region", "[templates]") {
+  VolumeMesh layers = test::lattice(1, 1, 4);  // regions 1, 1, 2, 2 from below
+  layers.references = {1, 1, 2, 2};
+  const auto at = [&](double z) { return vertex_at(layers, Vec3(0, 0, z)); };
+  const auto heights = [](const VolumeMesh& mesh) {
+    std::set<double> found;
+    for (const Vec3& p : mesh.positions) found.insert(p.z());
+    return found;
+  };
+  // Below and above the interface, and given from either side.
+  CHECK(heights(collapse_sheet(layers, at(1), at(2))) == std::set<double>{0, 2, 3, 4});
+  CHECK(heights(collapse_sheet(layers, at(2), at(1))) == std::set<double>{0, 2, 3, 4});
+  CHECK(heights(collapse_sheet(layers, at(3), at(2))) == std::set<double>{0, 1, 2, 4});
+  layers.references = {1, 2, 3, 3};
+  CHECK_THROWS_WITH(collapse_sheet(layers, at(1), at(2)), Catch::Contains("no cell of region 2 would be left"));
+}
+
 TEST_CASE("Splitting a sheet and collapsing a part of it are inverse", "[templates]") {
   const VolumeMesh lattice = tagged_lattice(2, 2, 3);
   const Index a = vertex_at(lattice, Vec3(0, 0, 1)), b = vertex_at(lattice, Vec3(0, 0, 2));
