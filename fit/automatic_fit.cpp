@@ -483,7 +483,6 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
 /// Fits a template whose cells are smaller where the best trial is not as good as aimed at: where the target is missed,
 /// and at cells that meet or are poor. Returns false if the fit must end.
 bool AutomaticFit::run_graded() {
-  constexpr double kLostShare = 1;      // of its radius by which a lost feature is missed
   constexpr double kShareOfGrid = 0.6;  // of the cells allowed; the others are left for the small ones
   const std::size_t most = options_.cells.value_or(static_cast<std::size_t>(kMostGrowth * kAutomaticCells.back()));
   if (!finest_ || static_cast<double>(finest_->mesh.num_cells()) > kMostShareOfGrid * static_cast<double>(most)) {
@@ -494,9 +493,6 @@ bool AutomaticFit::run_graded() {
   target_.sample(0);
   const ClosestPoint fitted(refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh))));
   std::vector<Vec3> places = missed_points(target_.surface, fitted, options_.max_tolerance_percent / 100);
-  const std::vector<Vec3> lost =
-      missed_feature_points(features_of_size(features_, kLostFeaturePercent / 100), fitted, kLostShare);
-  places.insert(places.end(), lost.begin(), lost.end());
   for (const Fault& fault : faults_of_best())
     for (const Index c : fault) places.push_back(center_of(result_.mesh, c));
   SearchStop stop([this] { return !runner_.is_to_end(); });

@@ -45,8 +45,21 @@ void add(AutomaticFitResult& result, const AutomaticFitResult& other, bool befor
     result.report.seconds[i].second += other.report.seconds[i].second;
 }
 
-bool is_as_good(const AutomaticFitTrial& trial, const AutomaticFitTrial& other) {
-  return is_valid(trial) && (is_good_enough(trial) || trial.merit <= other.merit);
+/// What missed groups add to the merit of a trial: ten of them weigh as much as a fifth of the quality aimed at.
+double cost_of_missed(std::size_t groups) {
+  constexpr double kOfOne = 0.1, kMost = 1;
+  return std::min(kMost, kOfOne * static_cast<double>(groups));
+}
+
+/// Returns true if a result is to be preferred to another one that misses so many groups.
+bool is_preferred(const TriangleMesh& target, const AutomaticFitResult& result, const AutomaticFitResult& other,
+                  std::size_t missed_by_other) {
+  if (result.trials.empty() || !is_valid(result.trials[result.chosen])) return false;
+  const std::size_t missed = num_groups_missed(target, result.mesh);
+  if (missed >= missed_by_other) return false;
+  const AutomaticFitTrial& trial = result.trials[result.chosen];
+  return is_good_enough(trial) ||
+         trial.merit + cost_of_missed(missed) <= other.trials[other.chosen].merit + cost_of_missed(missed_by_other);
 }
 
 }  // namespace
@@ -80,10 +93,7 @@ AutomaticFitResult fit_for_groups(const TriangleMesh& target, const AutomaticFit
   if (options.time_limit_seconds > 0)
     left.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - first.report.seconds.front().second);
   AutomaticFitResult second = fit(true, left);
-  const bool is_better = !second.trials.empty() &&
-                         is_as_good(second.trials[second.chosen], first.trials[first.chosen]) &&
-                         num_groups_missed(target, second.mesh) < missed;
-  if (is_better) {
+  if (is_preferred(target, second, first, missed)) {
     add(second, first, true);
     return second;
   }

@@ -10,11 +10,15 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <string_view>
 
 int main(int argc, char** argv) try {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: subvol_samples FOLDER\n");
-    return 2;
+  const std::string_view argument = argc == 2 ? argv[1] : "";
+  const bool asks_for_help = argument == "--help" || argument == "-h";
+  if (asks_for_help || argument.empty() || argument.front() == '-') {
+    std::fprintf(asks_for_help ? stdout : stderr,
+                 "usage: subvol_samples FOLDER\nWrites the surfaces, points and meshes of the samples to a folder.\n");
+    return asks_for_help ? 0 : 2;
   }
   const std::filesystem::path folder = argv[1];
   std::filesystem::create_directories(folder);

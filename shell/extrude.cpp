@@ -34,6 +34,7 @@ VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options) {
   VolumeMesh mesh = stack_cells(layers);
   mesh.tags = shell_tags(layers, options.tags);
   mesh.positions = straight_columns(layers, directions, std::vector<double>(layers.num_strands(), options.thickness));
+  if (!surface.face_groups.empty()) mesh.face_groups = shell_groups(layers);
   require_sound(mesh, "extrude");
   return mesh;
 }

@@ -22,7 +22,9 @@ struct ExtrudeOptions {
 /// `make_shell` grows layers that avoid each other and consist of good cells.
 ///
 /// returns  the cells layer by layer; references number the layers from 1. The boundary consists of the surface with
-///          reversed orientation, the top, and walls along the surface's border, whose edges become creases.
+///          reversed orientation, the top, and walls along the surface's border, whose edges become creases. If the
+///          surface has groups, its faces keep them, and the top and the walls get groups as a shell's
+///          (`shell_groups`).
 /// InputError: options out of range; whatever `make_layers` rejects; without a direction, a vertex from which no
 /// direction sees the front of all adjacent faces; an inverted cell in the result, for example because faces look away
 /// from the direction.

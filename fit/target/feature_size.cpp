@@ -64,16 +64,6 @@ std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, co
   return largest;
 }
 
-FeatureSizes features_of_size(const FeatureSizes& features, double least) {
-  FeatureSizes large;
-  for (std::size_t i = 0; i < features.points.size(); ++i) {
-    if (features.sizes[i] < least) continue;
-    large.points.push_back(features.points[i]);
-    large.sizes.push_back(features.sizes[i]);
-  }
-  return large;
-}
-
 std::vector<Vec3> missed_feature_points(const FeatureSizes& features, const ClosestPoint& fitted, double share) {
   std::vector<ClosestPoint::Hit> hits(features.points.size());
   fitted.closest(features.points, hits);

@@ -36,9 +36,6 @@ struct FeatureSizes {
 /// Parallel; same bits for any number of threads. Cost: some six closest points for each sample and side.
 FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most);
 
-/// Returns the points of features that are at least so large, in their order.
-FeatureSizes features_of_size(const FeatureSizes& features, double least);
-
 /// The place where a fitted surface misses a feature by the largest share of its size.
 struct FeatureMiss {
   double share = 0;  ///< distance / size

@@ -167,6 +167,8 @@ TEST_CASE("keep_groups: a second fit follows borders if the first one misses gro
   CHECK(first.report.stages[0].kept);
   CHECK(!first.report.stages[1].kept);
   CHECK(!is_good(run(bad, bad)));
+  poor.trials.front().merit = 0.18;  // not good, but less than two missed groups cost
+  CHECK(is_good(run(bad, poor)));
 
   AutomaticFitResult ended = bad;
   ended.report.stop_reason = StopReason::time_limit;

@@ -273,6 +273,13 @@ TEST_CASE("Extruding stacks hexes on quads and prisms on triangles", "[templates
   const VolumeMesh leaning = extrude(plate, {.thickness = std::sqrt(2.0), .direction = Vec3(1, 0, 1)});
   check_mesh_is(leaning, 1, 1.5);
   check_mesh_is(extrude(plate, {.thickness = 1}), 1, 1.5);
+  CHECK(up.face_groups.empty());
+  plate.face_groups = {{{"square", 3, 2}}, {0, kNoIndex}};
+  const VolumeFaceGroups groups = extrude(plate, {.thickness = 1}).face_groups;
+  REQUIRE(groups.groups.size() == 4);  // and "wall" for the triangle, "outer" for the top, "rim" for the walls
+  CHECK(groups.groups[0] == Group{"square", 3, 2});
+  const std::array<Index, 4> square{0, 1, 2, 3};
+  CHECK(std::ranges::find(groups.faces, GroupedFace{face_key(square), 0}) != groups.faces.end());
   CHECK_THROWS_AS(extrude(plate, {.thickness = 0}), InputError);
   CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .layers = 0}), InputError);
   CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .direction = Vec3(0, 0, -1)}), InputError);
