@@ -18,8 +18,8 @@ struct GradedGrid {
 };
 
 /// Cuts cells of a carved grid in 27 and carves the small ones anew: each is kept if at least half of it is inside the
-/// surface, as far as the topology of the whole allows (`evolve`, `reach_thin_parts`). So a slot that is narrower than a
-/// cell of the grid is opened, and a thin finger gets cells.
+/// surface, as far as the topology of the whole allows (`evolve`, `reach_thin_parts`). So a slot that is narrower than
+/// a cell of the grid is opened, and a thin finger gets cells.
 ///
 /// Cells around those that are cut are divided so that the mesh conforms (`refine_locally`); cells that come to be cut
 /// in 27 by that are carved anew as well. All others stay as they are.
