@@ -51,8 +51,9 @@ bool has_cavity(const VolumeMesh& mesh) {
     parts.join(t[0], t[2]);
   }
   std::map<Index, double> volumes;
+  const auto from_first = [&](Index v) { return Vec3(boundary.positions[v] - boundary.positions.front()); };
   for (const auto& t : boundary.triangles)
-    volumes[parts.of(t[0])] += boundary.positions[t[0]].dot(boundary.positions[t[1]].cross(boundary.positions[t[2]]));
+    volumes[parts.of(t[0])] += from_first(t[0]).dot(from_first(t[1]).cross(from_first(t[2])));
   return std::ranges::any_of(volumes, [](const auto& part) { return part.second < 0; });
 }
 
