@@ -93,6 +93,8 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
 }
 
 MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh) {
+  const auto is_vertex = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < template_mesh.num_vertices(); };
+  if (!std::ranges::all_of(template_mesh.cell_vertices, is_vertex)) return {};  // the fit refuses it
   MatchedTarget matched{.regions = regions_as_in(target, template_mesh), .outer = {}, .warning = {}};
   if (matched.regions) {
     matched.outer = outer_surface(*matched.regions);
