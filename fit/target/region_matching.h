@@ -32,6 +32,7 @@ struct MatchedTarget {
 /// Finds what a template can reproduce of a target. If the target has regions, and the template has not the same ones
 /// (`regions_as_in`) and no cavity, that is the target's outer surface: sheets inside would draw the boundary inward.
 /// The walls of cavities may look like regions, depending on their orientation; they stay.
+/// A template with a vertex number out of range gets nothing.
 ///
 /// InputError: as `regions_as_in`. Cost: as `find_regions`, and `regions_as_in` if the template has regions.
 MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh);

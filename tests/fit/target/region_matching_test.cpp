@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/region_matching.h"
 
+#include "subvol/base/error.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/subdivision_fit.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -74,6 +75,8 @@ TEST_CASE("A target whose regions the template lacks counts as its outer surface
   CHECK(solid_boundary(triangulate(boundary_surface(fit.mesh, MeshTopology(fit.mesh)))).volume ==
         Approx(1).epsilon(1e-3));
   CHECK(warns_of_outer_surface(fit_high_order(target, start, {.order = 2}).report));
+  start.cell_vertices.back() = 1000000;
+  CHECK_THROWS_AS(fit_subdivision_volume(target, start, FitOptions{}), InputError);
 }
 
 TEST_CASE("Walls of cavities are targets of a template with a cavity, whatever their orientation",
