@@ -79,20 +79,6 @@ struct LevelLayout {
   FollowedCreases creases;
 };
 
-Vec3 center_of(const VolumeMesh& mesh, Index cell) {
-  Vec3 sum = Vec3::Zero();
-  for (const Index v : mesh.cell(cell)) sum += mesh.positions[v];
-  return sum / static_cast<double>(mesh.cell(cell).size());
-}
-
-/// Returns the share of the curves' length that paths follow.
-double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
-  double all = 0, routed = 0;
-  for (const FeatureCurve& curve : curves.curves) all += curve.length();
-  for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
-  return all > 0 ? routed / all : 1;
-}
-
 /// Tells which curves of the target a fit follows.
 struct EdgeChoice {
   bool sharp = false, borders = false;  ///< sharp edges; borders of groups
@@ -129,7 +115,6 @@ class AutomaticFit : AutomaticDriver {
   std::optional<CreaseDistance> distance_of_edges() const;
   std::vector<UnfollowedCurve> unfollowed_curves() const;
   bool judge(AutomaticFitTrial trial) override;
-  void conclude();
   bool is_worth_trying(const AutomaticAttempt& attempt) const {
     // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
     constexpr double kMany = 0.4;
@@ -494,7 +479,7 @@ bool AutomaticFit::run_graded() {
   const ClosestPoint fitted(refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh))));
   std::vector<Vec3> places = missed_points(target_.surface, fitted, options_.max_tolerance_percent / 100);
   for (const Fault& fault : faults_of_best())
-    for (const Index c : fault) places.push_back(center_of(result_.mesh, c));
+    for (const Index c : fault) places.push_back(cell_center(result_.mesh, result_.mesh.positions, c));
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
                                                     target_.normalisation.from_unit(std::move(places)), most, stop);
@@ -548,29 +533,6 @@ bool AutomaticFit::run_attempt(const AutomaticAttempt& attempt) {
   return going;
 }
 
-void AutomaticFit::conclude() {
-  FitReport& report = result_.report;
-  const AutomaticFitTrial& chosen = best();
-  const std::string found = formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%",
-                                      chosen.least_scaled_jacobian, chosen.mean_percent, chosen.max_percent);
-  report.explanation = found;
-  if (chosen.max_percent > options_.max_tolerance_percent || chosen.mean_percent > options_.mean_tolerance_percent ||
-      chosen.least_share < 1)
-    report.warnings.push_back(
-        formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ", options_.quality,
-                  options_.mean_tolerance_percent, options_.max_tolerance_percent) +
-        found);
-  if (chosen.feature_miss && chosen.feature_miss->share > kAutomaticFeatureShare) {
-    const FeatureMiss& miss = *chosen.feature_miss;
-    report.warnings.push_back(
-        formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
-                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
-                  miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
-  }
-  warn_of_missed_edges(result_.missed_edges, chosen.curves, "sharp edges", report);
-  mark_if_far_off(result_, options_, "sharp edges");
-}
-
 AutomaticFitResult AutomaticFit::run() {
   find_edges();
   find_features();
@@ -606,7 +568,7 @@ AutomaticFitResult AutomaticFit::run() {
         run_attempt({AutomaticAttempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
   if (going) going = polish();
-  if (going) conclude();
+  if (going) conclude_fit(result_, options_);
   return finish();
 }
 

@@ -45,7 +45,8 @@ void add(AutomaticFitResult& result, const AutomaticFitResult& other, bool befor
     result.report.seconds[i].second += other.report.seconds[i].second;
 }
 
-/// What missed groups add to the merit of a trial: ten of them weigh as much as a fifth of the quality aimed at.
+/// Returns what missed groups add to the merit of a trial: ten of them weigh as much as a fifth of the quality aimed
+/// at.
 double cost_of_missed(std::size_t groups) {
   constexpr double kOfOne = 0.1, kMost = 1;
   return std::min(kMost, kOfOne * static_cast<double>(groups));

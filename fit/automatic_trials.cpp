@@ -159,4 +159,27 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   for (const std::string& reason : reasons) result.report.explanation += "; " + reason;
 }
 
+void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options) {
+  FitReport& report = result.report;
+  const AutomaticFitTrial& chosen = result.trials[result.chosen];
+  const std::string found = formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%",
+                                      chosen.least_scaled_jacobian, chosen.mean_percent, chosen.max_percent);
+  report.explanation = found;
+  if (chosen.max_percent > options.max_tolerance_percent || chosen.mean_percent > options.mean_tolerance_percent ||
+      chosen.least_share < 1)
+    report.warnings.push_back(
+        formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ", options.quality,
+                  options.mean_tolerance_percent, options.max_tolerance_percent) +
+        found);
+  if (chosen.feature_miss && chosen.feature_miss->share > kAutomaticFeatureShare) {
+    const FeatureMiss& miss = *chosen.feature_miss;
+    report.warnings.push_back(
+        formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
+                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
+                  miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
+  }
+  warn_of_missed_edges(result.missed_edges, chosen.curves, "sharp edges", report);
+  mark_if_far_off(result, options, "sharp edges");
+}
+
 }  // namespace subvol::internal

@@ -68,6 +68,10 @@ std::size_t num_long_edges_lost(std::span<const MissedEdge> missed);
 void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,
                           FitReport& report);
 
+/// Writes the explanation of a finished fit of one solid, and warnings of what it misses: quality, distances, a small
+/// feature, sharp edges; then as `mark_if_far_off`.
+void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options);
+
 /// Completes the report of a finished fit, whose explanation says what was reached: `tolerance_missed` if that is far
 /// off (`kFarOffFactor` and the constants below it).
 /// name  what the curves are called.

@@ -38,7 +38,7 @@ TriangleMesh triangles_from(const py::object& object, const char* name);
 SurfaceMesh surface_from(const py::object& object, const char* name);
 /// A surface as above, or points: an (n, 3) array, or the path of a file of them. InputError also as `sound_points`.
 cli::Target target_from(const py::object& object, const char* name);
-/// The same for fits: of a volume mesh with several regions, also the interfaces between them.
+/// Converts the target of a fit in the same way; of a volume mesh, also the interfaces between its regions.
 cli::Target target_with_regions_from(const py::object& object, const char* name);
 
 }  // namespace subvol::python

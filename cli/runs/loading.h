@@ -42,16 +42,17 @@ inline bool is_cloud(const Target& target) { return std::holds_alternative<Point
 
 /// Loads points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
-/// The same for fits, which reproduce the interfaces between the regions of a volume mesh as well.
+/// Loads a target of a fit as `load_target`; of a volume mesh, also the interfaces between its regions.
 Target load_target_with_regions(const std::filesystem::path& path, std::vector<std::string>& warnings);
 /// Returns the boundary of a mesh, with the interfaces between its regions if it has several.
 TriangleMesh surface_with_interfaces(const VolumeMesh& mesh);
 
-/// What a fit with a template reproduces of its target (`matched_target`).
+/// Holds what a fit with a template reproduces of its target.
 struct FittedTarget {
   std::optional<RegionSurface> regions;  ///< of the target, if the template has the same
   Target outer;                          ///< what the boundary of the result is compared with
 };
+/// Returns it for a template (`matched_target`); of points, all of them.
 FittedTarget fitted_target(const Target& target, const VolumeMesh& template_mesh);
 /// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);

@@ -382,4 +382,11 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
   return cleared.followed_length() > router.followed_length() ? other : routing;
 }
 
+double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
+  double all = 0, routed = 0;
+  for (const FeatureCurve& curve : curves.curves) all += curve.length();
+  for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
+  return all > 0 ? routed / all : 1;
+}
+
 }  // namespace subvol::internal

@@ -90,4 +90,7 @@ struct FeatureRouting {
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
                               const RoutingOptions& options = {});
 
+/// Returns the share of the curves' length that paths follow; 1 without curves.
+double routed_share(const FeatureRouting& routing, const FeatureCurves& curves);
+
 }  // namespace subvol::internal

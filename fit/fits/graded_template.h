@@ -27,7 +27,7 @@ std::vector<Vec3> missed_points(const TargetSurface& target, const ClosestPoint&
 /// most_cells  that the result may have.
 /// stop     if stopped, the result is nothing.
 /// returns  nothing if there is no room for the first places, or no place is in the grid.
-/// Cost: up to a dozen of these grids.
+/// Cost: up to some twenty of these grids.
 std::optional<SizedMesh> graded_template(const TriangleMesh& surface, const VoxelGrid& grid, std::span<const char> kept,
                                          std::span<const Vec3> places, std::size_t most_cells, SearchStop& stop);
 

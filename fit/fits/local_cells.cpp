@@ -50,13 +50,13 @@ double sum_of_squared_sizes(const MeshTopology& topology, std::span<const double
   return squares;
 }
 
-Vec3 center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t c) {
+}  // namespace
+
+Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t c) {
   Vec3 sum = Vec3::Zero();
   for (const Index v : mesh.cell(c)) sum += positions[v];
   return sum / static_cast<double>(mesh.cell(c).size());
 }
-
-}  // namespace
 
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells) {
@@ -101,11 +101,11 @@ std::vector<Index> cells_at(const VolumeMesh& mesh, std::span<const Vec3> positi
                             std::span<const Index> cells_of_other) {
   if (mesh.num_cells() == 0) return {};
   std::vector<Vec3> centers;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) centers.push_back(center(mesh, positions, c));
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) centers.push_back(cell_center(mesh, positions, c));
   const SiteTree tree(centers);
   std::vector<Index> cells;
   for (const Index c : cells_of_other)
-    cells.push_back(tree.site(tree.nearest(center(other, other.positions, c)).place));
+    cells.push_back(tree.site(tree.nearest(cell_center(other, other.positions, static_cast<std::size_t>(c))).place));
   return ascending(std::move(cells));
 }
 

@@ -33,6 +33,9 @@ using Fault = std::vector<Index>;
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells);
 
+/// Returns the mean of a cell's corners.  positions  of the mesh's vertices.
+Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t cell);
+
 /// Finds cells at the boundary of a mesh by points.
 class BoundaryCells {
  public:

@@ -21,15 +21,16 @@ namespace subvol::internal {
 /// InputError: as `find_regions`. Cost: a winding number for each cell and region.
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh);
 
-/// What a fit with a template reproduces of a target.
+/// Holds what a fit with a template reproduces of a target.
 struct MatchedTarget {
   std::optional<RegionSurface> regions;  ///< those of the target, if the template has the same
-  /// What the boundary reproduces, if that is not all of the target: the outer surface of its regions.
+  /// The boundary reproduces this, the outer surface of the target's regions; nothing: it reproduces all of the target.
   std::optional<TriangleMesh> outer;
   std::string warning;  ///< why sheets inside the target are left out; empty: none are
 };
 
-/// Finds what a template can reproduce of a target. If the target has regions, and the template has not the same ones
+/// Finds what a template can reproduce of a target. If the target has regions, and the template does not have the same
+/// ones
 /// (`regions_as_in`) and no cavity, that is the target's outer surface: sheets inside would draw the boundary inward.
 /// The walls of cavities may look like regions, depending on their orientation; they stay.
 /// A template with a vertex number out of range gets nothing.

@@ -40,7 +40,7 @@ struct AutoTemplate {
   /// increasing; empty if the cells are equal cubes.
   std::array<std::vector<double>, 3> lines;
   VoxelGrid grid;               ///< of which the mesh is a part
-  std::vector<char> kept;       ///< for each cell of the grid, non-zero if it is in the mesh
+  std::vector<char> kept;       ///< for each cell of the grid, non-zero if the mesh without a pillow has it
   double aligned_share = 0;     ///< share of the surface's area on planes through `lines`, in [0, 1]
 };
 

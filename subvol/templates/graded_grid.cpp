@@ -40,7 +40,7 @@ void for_each_around(const VoxelGrid& grid, const Place& at, Visit&& visit) {
       for (int i = std::max(at[0] - 1, 0); i <= std::min(at[0] + 1, grid.cells[0] - 1); ++i) visit(grid.cell(i, j, k));
 }
 
-/// Lattice coordinates in a grid.
+/// Maps points to lattice coordinates in a grid.
 class LatticeCoordinates {
  public:
   explicit LatticeCoordinates(const VoxelGrid& grid) : grid_(grid), to_grid_(grid.edges.inverse()) {}
@@ -67,7 +67,7 @@ VoxelGrid grid_of_parts(const VoxelGrid& grid, const Place& low, const Place& hi
   return parts;
 }
 
-/// The parts of the cells that are cut in 27.
+/// Tells which parts of the cells that are cut in 27 are kept.
 class CarvedParts {
  public:
   /// is_cut  one entry per cell of the grid.
