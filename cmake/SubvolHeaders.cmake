@@ -56,6 +56,7 @@ set(entry_points
   fit/mesh_check.h
   fit/mending/mend_surface.h
   fit/mending/surface_repair.h
+  fit/optimize_curved.h
   fit/optimize_mesh.h
   fit/quality/quality.h
   fit/subdivision_fit.h

@@ -7,6 +7,7 @@
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/energies/make_surface_term.h"
+#include "subvol/fit/fits/cell_lift.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
@@ -27,10 +28,6 @@
 namespace subvol::internal {
 
 namespace {
-
-/// The threshold of the hinge is the quality aimed at plus this. At order 4, a bone of 87 hexes came to a least scaled
-/// Jacobian of 0.66 with 0.05, and to 0.76 with 0.2; a double torus gained nothing with 0.35.
-constexpr double kHingeAboveQuality = 0.2;
 
 /// Share of the target's sharp edges, by length, that creases must follow for the lower of the two usual lambdas: soft
 /// cells are pressed flat where the surface is drawn into an edge that they do not follow. Of a wedge of 15 degrees
@@ -76,8 +73,8 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
 }
 
 void HighOrderDriver::look_over_template() {
-  const StartComparison start =
-      target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
+  const StartComparison start = target_.compare_start(
+      order_ > 1 ? measured_boundary() : refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report_.note_start(start);
   const double usual_lambda = creases_.followed_share() >= kNearlyAllEdges ? kCurvingLambda : kLambdaOfOrders;
   schedule_ = make_high_order_schedule(options_.lambda_close.value_or(usual_lambda),
@@ -371,6 +368,14 @@ std::vector<Vec3> HighOrderDriver::in_target_units(std::vector<Vec3> coefficient
     coefficients[i] = target_.normalisation.diagonal * coefficients[i] +
                       (i < num_vertices ? target_.normalisation.centre : Vec3(0, 0, 0));
   return coefficients;
+}
+
+HighOrderMesh HighOrderDriver::in_unit(HighOrderMesh mesh) const {
+  for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
+    mesh.coefficients[i] =
+        (mesh.coefficients[i] - (i < mesh.space.num_vertices() ? target_.normalisation.centre : Vec3(0, 0, 0))) /
+        target_.normalisation.diagonal;
+  return mesh;
 }
 
 }  // namespace subvol::internal

@@ -45,7 +45,8 @@ class HighOrderDriver : protected StagedFit {
   HighOrderDriver(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
   ~HighOrderDriver() = default;
 
-  /// Measures the template's distance, chooses the schedule by it, and finds the interfaces to be kept.
+  /// Measures the distance of the template, or of the curved cells if there are any by now, chooses the schedule by it,
+  /// and finds the interfaces to be kept.
   void look_over_template();
   /// Checks that the memory suffices for a mesh of these orders.
   bool has_room(const EntityOrders& orders);
@@ -87,6 +88,8 @@ class HighOrderDriver : protected StagedFit {
   std::optional<std::size_t> intersecting_pairs() override;
   std::optional<bool> is_folded();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
+  /// The reverse, for a mesh.
+  HighOrderMesh in_unit(HighOrderMesh mesh) const;
 
   std::vector<Vec3>& unknowns() override { return mesh_.coefficients; }
   FitReport& report() override { return report_; }

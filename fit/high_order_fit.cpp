@@ -6,11 +6,13 @@
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/fit/energies/make_surface_term.h"
+#include "subvol/fit/fits/cell_lift.h"
 #include "subvol/fit/fits/order_indicator.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/high_order_driver.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/fit/target/region_matching.h"
+#include "subvol/mesh/interfaces.h"
 
 #include <algorithm>
 #include <cmath>
@@ -39,15 +41,6 @@ constexpr double kNearMeanPercent = 0.005;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
-/// Values of a setting that lifts poor cells: the first one, multiplied each time by the factor, up to the last.
-struct LiftValues {
-  double first, factor, last;
-};
-/// Emphasis on places of poor shape, and weight of the hinge.
-constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
-constexpr int kLiftSteps = 8;
-/// Values in a row that may fail to help before no higher one is attempted.
-constexpr int kMostFailedLifts = 3;
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
 constexpr double kFairScaledJacobian = 0.5;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
@@ -62,11 +55,12 @@ class HighOrderFit : HighOrderDriver {
   HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options)
       : HighOrderDriver(std::move(target), template_mesh, options) {}
   HighOrderFitResult run();
+  /// start: curved cells on the template's vertices, in the target's unit.
+  HighOrderFitResult run_from(const HighOrderMesh& start);
 
  private:
-  /// Outcome of a repeated stage; ended: it was interrupted.
-  enum class Again { kept, undone, ended };
-
+  template <class Work>
+  HighOrderFitResult concluded(const Work& work);
   void begin_try(const HighOrderTry& attempt);
   bool run_order(Approach approach, int order);
   bool run_first_orders(int last);
@@ -81,7 +75,7 @@ class HighOrderFit : HighOrderDriver {
   Again run_again(std::span<const Index> cells, double& setting, double value, int steps);
   Again draw_in_far_places();
   Again lift_worst_places();
-  Again lift(double& setting, const LiftValues& values);
+  Again lift_by(double& setting, const LiftValues& values);
 
   Approach approach_ = Approach::direct;
   Outcome outcome_{};                    ///< of the kept state, while the worst places are improved
@@ -305,7 +299,7 @@ bool HighOrderFit::is_better(const Outcome& next) const {
 
 /// Repeats the last stage around some cells with one setting changed; if the result is not better, rolls back the stage
 /// and the setting.
-HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, double value, int steps) {
+Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, double value, int steps) {
   FitSnapshot before = snapshot();
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
@@ -322,7 +316,7 @@ HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double
 }
 
 /// Puts more and more emphasis on places much farther off than the mean, as long as there are any.
-HighOrderFit::Again HighOrderFit::draw_in_far_places() {
+Again HighOrderFit::draw_in_far_places() {
   Again last = Again::kept;
   if (options_.correspondence != Correspondence::closest) return last;
   for (int draw = 0; draw < kMostDraws && last == Again::kept; ++draw) {
@@ -334,9 +328,8 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   return last;
 }
 
-/// Repeats the last stage around poor cells with higher and higher values of a setting. A value that does not help may
-/// be too low to change the worst cell, so higher ones are attempted as well before this ends.
-HighOrderFit::Again HighOrderFit::lift(double& setting, const LiftValues& values) {
+/// Repeats the last stage around poor cells with higher and higher values of a setting.
+Again HighOrderFit::lift_by(double& setting, const LiftValues& values) {
   const auto poor_cells = [&] {  // the poorest first
     const std::vector<double>& minima = outcome_.cell_minima;
     std::vector<Index> cells;
@@ -348,28 +341,51 @@ HighOrderFit::Again HighOrderFit::lift(double& setting, const LiftValues& values
   const auto is_poor = [&] {
     return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < options_.quality;
   };
-  double attempted = setting;
-  for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < values.last;) {
-    attempted = attempted == 0 ? values.first : values.factor * attempted;
-    const Again last = run_again(poor_cells(), setting, attempted, kLiftSteps);
-    if (last == Again::ended) return last;
-    failures = last == Again::kept ? 0 : failures + 1;
-  }
-  return Again::kept;
+  return lift(setting, values, is_poor,
+              [&](double value) { return run_again(poor_cells(), setting, value, kLiftSteps); });
 }
 
 /// Weighs places of poor shape more, and then penalizes their scaled Jacobians, as long as there are any. The penalty
 /// comes second: by itself, it does not lift cells that are nearly flat.
-HighOrderFit::Again HighOrderFit::lift_worst_places() {
-  if (lift(emphasis_, kEmphases) == Again::ended) return Again::ended;
-  return lift(hinge_, kHinges);
+Again HighOrderFit::lift_worst_places() {
+  if (lift_by(emphasis_, kEmphases) == Again::ended) return Again::ended;
+  return lift_by(hinge_, kHinges);
 }
 
 HighOrderFitResult HighOrderFit::run() {
   look_over_template();
   const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
+  return concluded([&] {
+    return run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()) && finish();
+  });
+}
+
+HighOrderFitResult HighOrderFit::run_from(const HighOrderMesh& start) {
+  mesh_ = in_unit(start);
+  set_orders(mesh_.space.orders());
+  look_over_template();
+  EntityOrders orders = mesh_.space.orders();
+  for (std::vector<int>* of_entities : {&orders.edges, &orders.faces, &orders.cells})
+    for (int& order : *of_entities) order = std::max(order, options_.order);
+  options_.order = std::max(options_.order, mesh_.space.max_order());
+  return concluded([&] {
+    if (!has_room(orders)) return false;
+    set_orders(orders);
+    try_ = 1;
+    take_own_boxes();
+    stays_dense_ = false;
+    for (const Stage& stage : schedule_.stages(approach_, order_, order_))
+      if (!run_next_stage(stage)) return false;
+    stays_dense_ = true;
+    return finish();
+  });
+}
+
+/// Does the work and returns the result in the target's unit. work(): returns false if the fit must end.
+template <class Work>
+HighOrderFitResult HighOrderFit::concluded(const Work& work) {
   try {
-    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()) && finish())
+    if (work())
       runner_.conclude(measured_mean(), options_.tolerance_percent, report_);
     else
       leave_folds();
@@ -393,6 +409,24 @@ HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& 
   auto result = HighOrderFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
   return result;
+}
+
+HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMesh& start, const VolumeMesh& labels,
+                                  const HighOrderFitOptions& given) {
+  VolumeMesh cells = start.straight_sided();
+  if (labels.kinds != cells.kinds || labels.cell_vertices != cells.cell_vertices)
+    throw InputError("fit_high_order: the labels belong to other cells");
+  cells.references = labels.references;
+  cells.regions = labels.regions;
+  if (region_references(cells).size() > 1)
+    throw InputError(
+        "curved cells of several regions are not drawn to a target: their interfaces would not keep their "
+        "shape; without a target they do");
+  cells.tags = labels.tags;
+  cells.face_groups = labels.face_groups;
+  HighOrderFitOptions options = given;
+  options.basis = start.space.basis();
+  return HighOrderFit(FitTarget(target), cells, options).run_from(start);
 }
 
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,

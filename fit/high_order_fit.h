@@ -76,6 +76,16 @@ struct HighOrderFitResult {
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);
 
+/// Fits curved elements from cells that are curved already: to the surface, with the orders that they have or, where
+/// `HighOrderFitOptions::order` is higher, that one.
+///
+/// start    of hexes, prisms and tets, close to the target; its basis is that of the result (`basis` is ignored), and
+///          `adaptive` is, too. Its cells should be certified (`optimize_curved`).
+/// labels   the same cells with their references, groups and tags; its positions are not read.
+/// InputError: as above; other cells in `labels`; several regions, whose curved interfaces cannot be kept.
+HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMesh& start, const VolumeMesh& labels,
+                                  const HighOrderFitOptions& options);
+
 /// Fits curved elements to points, as `fit_subdivision_volume` does. InputError: also for crease_angle_degrees and
 /// Correspondence::voronoi, which need triangles.
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,

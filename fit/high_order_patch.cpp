@@ -68,7 +68,31 @@ EntityOrders orders_of_part(const MeshTopology& part, const ElementSpace& whole,
   return orders;
 }
 
+/// The space of some cells of a mesh, with its orders. The vertices of the part are numbered in the order of the mesh,
+/// so that the frames of its entities are the same.
+ElementSpace space_of(const VolumeMesh& mesh, const ElementSpace& space, std::span<const Index> cells) {
+  const VolumeMesh part = patch_mesh(mesh, cells);
+  return {part, space.basis(), orders_of_part(MeshTopology(part), space, cells)};
+}
+
+/// For each node of a part, the node of the whole mesh.
+std::vector<Index> nodes_of_part(const ElementSpace& part, const ElementSpace& whole, std::span<const Index> cells) {
+  std::vector<Index> nodes(part.num_nodes());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto own = part.nodes(i), of_whole = whole.nodes(cells[i]);
+    for (std::size_t a = 0; a < own.size(); ++a) nodes[own[a]] = of_whole[a];
+  }
+  return nodes;
+}
+
 }  // namespace
+
+HighOrderMesh cells_of(const HighOrderMesh& mesh, std::span<const Index> cells) {
+  ElementSpace space = space_of(mesh.straight_sided(), mesh.space, cells);
+  std::vector<Vec3> coefficients;
+  for (const Index node : nodes_of_part(space, mesh.space, cells)) coefficients.push_back(mesh.coefficients[node]);
+  return {std::move(space), std::move(coefficients)};
+}
 
 std::vector<Vec3> HighOrderPatch::coefficients(std::span<const Vec3> of_mesh) const {
   std::vector<Vec3> result;
@@ -76,21 +100,14 @@ std::vector<Vec3> HighOrderPatch::coefficients(std::span<const Vec3> of_mesh) co
   return result;
 }
 
-/// The vertices of the part are numbered in the order of the mesh, so that the frames of its entities are the same.
 std::optional<HighOrderPatch> high_order_patch(const VolumeMesh& mesh, const ElementSpace& space,
                                                std::span<const Index> centers, int rings, std::size_t most_cells) {
   const Marks moves = vertices_within(mesh, centers, rings);
   std::vector<Index> cells = cells_at(mesh, moves);
   if (cells.size() > most_cells) return {};
-  const VolumeMesh part = patch_mesh(mesh, cells);
-  const EntityOrders orders = orders_of_part(MeshTopology(part), space, cells);
-  HighOrderPatch patch{nodes_between(space, moves), std::move(cells), ElementSpace(part, space.basis(), orders), {}};
-  patch.nodes.resize(patch.space.num_nodes());
-  for (std::size_t i = 0; i < patch.cells.size(); ++i) {
-    const auto own = patch.space.nodes(i), whole = space.nodes(patch.cells[i]);
-    for (std::size_t a = 0; a < own.size(); ++a) patch.nodes[own[a]] = whole[a];
-  }
-  return patch;
+  ElementSpace part = space_of(mesh, space, cells);
+  std::vector<Index> nodes = nodes_of_part(part, space, cells);
+  return HighOrderPatch{nodes_between(space, moves), std::move(cells), std::move(part), std::move(nodes)};
 }
 
 FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coefficients,

@@ -38,6 +38,9 @@ struct HighOrderPatch {
 std::optional<HighOrderPatch> high_order_patch(const VolumeMesh& mesh, const ElementSpace& space,
                                                std::span<const Index> centers, int rings, std::size_t most_cells);
 
+/// Returns the mesh of some cells (ascending) with their vertices in the order of the mesh, as the same map.
+HighOrderMesh cells_of(const HighOrderMesh& mesh, std::span<const Index> cells);
+
 /// Makes the minimization over the unknowns of a patch.
 ///
 /// volume   energy of `patch.space`, which the problem refers to.

@@ -82,7 +82,7 @@ class MeshOptimizer : OptimizeDriver {
 bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options) {
   std::vector<Vec3> x;
   FitProblem problem = make_problem(boundary, boundary == Boundary::fixed ? 1 : kUntangleLambda, true, x);
-  UntangleResult result = untangle(problem, mesh_, options, runner_, record(name), x, report_);
+  UntangleResult result = untangle(problem, mesh_.num_cells(), options, runner_, record(name), x, report_);
   problem.apply_nodes(x, mesh_.positions);
   uncertified_ = std::move(result.uncertified);
   return result.going;

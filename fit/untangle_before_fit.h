@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/optimize_curved.h"
 #include "subvol/fit/optimize_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 
@@ -25,5 +26,8 @@ struct UntangledStart {
 /// Does nothing if no cell is tangled. InputError: as `optimize_mesh`, and if cells could not be made valid, with their
 /// number and the first of them.
 UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options);
+
+/// Does the same for curved cells (`optimize_curved`).
+UntangledStart untangle_before_fit(HighOrderMesh& mesh, const VolumeMesh& labels, const CurvedOptimizeOptions& options);
 
 }  // namespace subvol

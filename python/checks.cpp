@@ -19,29 +19,14 @@ using namespace internal;
 namespace {
 
 /// The mesh to check: linear or curved cells, from memory or a file.
-struct CheckedMesh {
-  explicit CheckedMesh(const py::object& object) {
-    if (py::isinstance<CurvedMesh>(object)) {
-      curved = object.cast<std::shared_ptr<CurvedMesh>>();
-    } else if (is_path(object)) {
-      const std::string path = path_from(object);
-      cli::LoadedMesh mesh = mesh_from_file(path, false);
-      if (auto* cells = std::get_if<VolumeMesh>(&mesh)) {
-        linear = std::make_shared<const VolumeMesh>(std::move(*cells));
-      } else if (auto* file = std::get_if<HighOrderFile>(&mesh)) {
-        const py::gil_scoped_release unlocked;
-        curved = std::make_shared<const CurvedMesh>(std::move(*file));
-        if (holds_exact_map(path)) lagrange = cli::check_lagrange_cells(path, curved->mesh);
-      } else {
-        throw InputError(path + ": a surface, but cells are wanted");
-      }
-    } else {
-      linear = volume_from(object, "mesh", false);
-    }
+struct CheckedMesh : Cells {
+  explicit CheckedMesh(const py::object& object) : Cells(cells_from(object, "mesh", false)) {
+    if (!curved || !is_path(object)) return;
+    const std::string path = path_from(object);
+    const py::gil_scoped_release unlocked;
+    if (holds_exact_map(path)) lagrange = cli::check_lagrange_cells(path, curved->mesh);
   }
 
-  std::shared_ptr<const VolumeMesh> linear;
-  std::shared_ptr<const CurvedMesh> curved;
   std::optional<cli::LagrangeCheck> lagrange;  ///< for a .vtu
 };
 

@@ -368,6 +368,17 @@ std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const ch
   });
 }
 
+Cells cells_from(const py::object& object, const char* name, bool check) {
+  if (py::isinstance<CurvedMesh>(object)) return {nullptr, object.cast<std::shared_ptr<CurvedMesh>>()};
+  if (!is_path(object)) return {volume_from(object, name, check), nullptr};
+  cli::LoadedCells cells = read_with_warnings([&, path = path_from(object)](std::vector<std::string>& warnings) {
+    return cli::load_cells(path, warnings, check);
+  });
+  if (auto* linear = std::get_if<VolumeMesh>(&cells))
+    return {std::make_shared<const VolumeMesh>(std::move(*linear)), nullptr};
+  return {nullptr, std::make_shared<const CurvedMesh>(std::get<HighOrderFile>(std::move(cells)))};
+}
+
 std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name) {
   std::shared_ptr<const VolumeMesh> mesh = volume_from(object, name);
   if (is_path(object)) return mesh;  // the reader has checked it

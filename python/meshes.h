@@ -30,8 +30,15 @@ cli::LoadedMesh mesh_from_file(const std::string& path, bool check);
 /// Converts an argument that is a mesh, or the path of a file, which is read as the program reads it; `name` is for
 /// messages. TypeError: something else. InputError: a file that the readers refuse. Warnings go to Python.
 std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const char* name, bool check = true);
-/// Does the same for functions that rely on a mesh that is valid except for inverted cells and unused points, else
-/// InputError.
+/// Linear or curved cells; one of the two is there.
+struct Cells {
+  std::shared_ptr<const VolumeMesh> linear;
+  std::shared_ptr<const CurvedMesh> curved;
+};
+/// Converts an argument that is a VolumeMesh, a HighOrderMesh, or the path of either in the same way.
+Cells cells_from(const py::object& object, const char* name, bool check = true);
+/// Does the same as `volume_from` for functions that rely on a mesh that is valid except for inverted cells and unused
+/// points, else InputError.
 std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name);
 /// A surface, or the boundary of a volume mesh: as triangles, or as polygons with tags. InputError: points not finite.
 TriangleMesh triangles_from(const py::object& object, const char* name);

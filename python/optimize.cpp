@@ -13,6 +13,8 @@
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/fit/optimize_curved.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/untangle_before_fit.h"
 #include "subvol/surface/boundary.h"
@@ -28,15 +30,17 @@ class Optimization {
   Optimization(const py::object& mesh, const py::kwargs& given)
       : keywords_("optimize", given), work_(keywords_), checkpoints_(keywords_) {
     const py::object target = keywords_.object("target");
-    curved_ = keywords_.has("order");
-    if (curved_) {
-      if (target.is_none()) throw InputError("optimize: order needs a target");
-      read_curved_options();
-    } else {
+    Cells cells = cells_from(mesh, "mesh");
+    start_ = cells.curved;
+    mesh_ = start_ ? std::make_shared<const VolumeMesh>(cli::labels_of(*start_)) : cells.linear;
+    const bool has_order = keywords_.has("order");
+    if (has_order && target.is_none()) throw InputError("optimize: order needs a target");
+    kind_ = !target.is_none() && (has_order || start_) ? Kind::curve : start_ ? Kind::curved : Kind::linear;
+    if (kind_ == Kind::curve)
+      read_curving_options();
+    else
       read_options();
-    }
     keywords_.finish();
-    mesh_ = volume_from(mesh, "mesh");
     if (!target.is_none()) target_ = triangles_from(target, "target");
     std::vector<std::pair<std::string, std::string>> inputs{{"mesh", cli::fingerprint(*mesh_)}};
     if (target_) inputs.emplace_back("target", cli::fingerprint(*target_));
@@ -45,17 +49,38 @@ class Optimization {
 
   std::shared_ptr<Optimized> run() {
     auto result = std::make_shared<Optimized>();
-    const QualityReport before = work_.run("quality", [&] { return measure_quality(*mesh_); });
-    json_["input"] = {{"mesh", cli::describe("", *mesh_)}, {"quality", cli::quality_json(before)}};
+    const QualityReport before =
+        work_.run("quality", [&] { return start_ ? measure_quality(start_->mesh) : measure_quality(*mesh_); });
+    json_["input"] = {{"mesh", start_ ? cli::describe("", start_->mesh) : cli::describe("", *mesh_)},
+                      {"quality", cli::quality_json(before)}};
     if (target_) json_["input"]["target"] = cli::describe("", *target_);
-    curved_ ? curve(*result) : optimize(*result);
+    switch (kind_) {
+      case Kind::linear:
+        optimize(*result);
+        break;
+      case Kind::curved:
+        optimize_curved_cells(*result);
+        break;
+      case Kind::curve:
+        curve(*result);
+        break;
+    }
     result->report = make_report("optimize", json_, keywords_, work_, warnings_);
     return result;
   }
 
  private:
+  enum class Kind {
+    linear,
+    curved,  ///< cells that are curved, and keep their boundary
+    curve    ///< cells that are drawn to a target as curved ones
+  };
+
   void read_options() {
     keywords_.refuse({"order", "basis"}, "goes with order only");
+    if (kind_ == Kind::curved)
+      keywords_.refuse({"sizes", "crease_angle", "tolerance", "max_tolerance", "lambda_"},
+                       "is not for curved cells without a target, whose boundary keeps its shape");
     keywords_.take("fixed_boundary", options_.fixed_boundary);
     keywords_.take("sizes", options_.sizes, {{"uniform", CellSizes::uniform}, {"local", CellSizes::local}});
     keywords_.take("crease_angle", options_.crease_angle_degrees);
@@ -68,12 +93,14 @@ class Optimization {
     keywords_.refuse({"chord"}, "goes with order only");
   }
 
-  void read_curved_options() {
-    keywords_.refuse({"fixed_boundary", "sizes", "max_tolerance"}, "does not go with order");
+  void read_curving_options() {
+    keywords_.refuse({"fixed_boundary", "sizes", "max_tolerance"},
+                     "does not go with order or curved cells and a target");
     curving_.lambda_close = kCurvingLambda;
     curving_.tolerance_percent = options_.mean_tolerance_percent;
+    curving_.order = 1;  // curved cells have theirs
     keywords_.take("order", curving_.order);
-    require_in_range("optimize", "order", curving_.order, 2, kMaxOrder);
+    require_in_range("optimize", "order", curving_.order, start_ ? 1 : 2, kMaxOrder);
     keywords_.take("basis", curving_.basis, bases());
     keywords_.take("tolerance", curving_.tolerance_percent);
     keywords_.take("quality", curving_.quality);
@@ -104,17 +131,46 @@ class Optimization {
     result.mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));
   }
 
+  void optimize_curved_cells(Optimized& result) {
+    CurvedOptimizeOptions options{.fixed_boundary = options_.fixed_boundary,
+                                  .quality = options_.quality,
+                                  .max_iterations = options_.max_iterations,
+                                  .time_limit_seconds = options_.time_limit_seconds,
+                                  .progress = work_.progress(),
+                                  .cancelled = work_.cancelled()};
+    CurvedOptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
+      options.log = log;
+      return optimize_curved(start_->mesh, *mesh_, options);
+    });
+    const MeshCheck checked = work_.run("check", [&] {
+      return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent),
+                        static_cast<const TriangleMesh*>(nullptr), {.labels = {mesh_->references, mesh_->regions}});
+    });
+    add(found.report, checked);
+    result.curved = with_labels(std::move(found.mesh));
+  }
+
+  std::shared_ptr<CurvedMesh> with_labels(HighOrderMesh mesh) const {
+    return std::make_shared<CurvedMesh>(
+        CurvedMesh{std::move(mesh), mesh_->references, mesh_->face_groups, mesh_->regions});
+  }
+
   void curve(Optimized& result) {
     curving_.progress = work_.progress();
     curving_.cancelled = work_.cancelled();
     VolumeMesh start = *mesh_;
-    OptimizeOptions options;
-    options.time_limit_seconds = curving_.time_limit_seconds;
-    options.progress = curving_.progress;
-    options.cancelled = curving_.cancelled;
-    const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
+    std::optional<HighOrderMesh> curved_start;
+    if (start_) curved_start = start_->mesh;
+    const auto with_limits = [&](auto options, StageLog* log) {
+      options.time_limit_seconds = curving_.time_limit_seconds;
+      options.progress = curving_.progress;
+      options.cancelled = curving_.cancelled;
       options.log = log;
-      return untangle_before_fit(start, options);
+      return options;
+    };
+    const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
+      return curved_start ? untangle_before_fit(*curved_start, start, with_limits(CurvedOptimizeOptions(), log))
+                          : untangle_before_fit(start, with_limits(OptimizeOptions(), log));
     });
     require_untangled(untangled, "optimize");
     curving_.time_limit_seconds = work_.time_left(curving_.time_limit_seconds);
@@ -123,15 +179,15 @@ class Optimization {
                           " cells were not valid; they were untangled before curving");
     HighOrderFitResult found = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       curving_.log = log;
-      return fit_high_order(*target_, start, curving_);
+      return curved_start ? fit_high_order(*target_, *curved_start, start, curving_)
+                          : fit_high_order(*target_, start, curving_);
     });
     const MeshCheck checked = work_.run("check", [&] {
       return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_,
                         {.labels = {mesh_->references, mesh_->regions}});
     });
     add(found.report, checked);
-    result.curved = std::make_shared<CurvedMesh>(
-        CurvedMesh{std::move(found.mesh), mesh_->references, mesh_->face_groups, mesh_->regions});
+    result.curved = with_labels(std::move(found.mesh));
     add(work_.run("groups", [&] { return cli::carry_groups(*target_, *result.curved); }));
   }
 
@@ -152,11 +208,12 @@ class Optimization {
   Keywords keywords_;
   Work work_;
   Checkpoints checkpoints_;
-  bool curved_ = false;
+  Kind kind_ = Kind::linear;
   OptimizeOptions options_;
   HighOrderFitOptions curving_;
   cli::WritingOptions writing_;
-  std::shared_ptr<const VolumeMesh> mesh_;
+  std::shared_ptr<const VolumeMesh> mesh_;   ///< of curved cells, the straight-sided ones with their labels
+  std::shared_ptr<const CurvedMesh> start_;  ///< null: the cells are linear
   std::optional<TriangleMesh> target_;
   Json json_;
   std::vector<std::string> warnings_;
@@ -170,16 +227,17 @@ constexpr const char* kOptimizeHelp =
 
 Untangles a mesh and improves its cells, or curves it: OptimizeResult.
 
-mesh            VolumeMesh or its path; its cells may be inverted
+mesh            VolumeMesh, HighOrderMesh or the path of either; its cells may be inverted
 target          what the boundary is to reproduce: SurfaceMesh, VolumeMesh or path; None: its boundary as it is
-fixed_boundary  boundary points stay; otherwise they slide along the surface
+fixed_boundary  boundary points stay; otherwise they slide along the surface; those of curved cells in flat parts only
 sizes           ideal sizes of the cells: 'uniform', or as they are, 'local'
 crease_angle    degrees: edges of the surface sharper than this stay sharp
 tolerance       mean distance from the surface to keep within, per cent of its diagonal
 max_tolerance   the same for the largest distance
 quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_         weight of the cells' shape; None: 0.1, with order 0.0025
-order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it
+order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it;
+                None: the order that they have
 basis           of curved cells: 'legendre' or 'fourier'
 
 max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";

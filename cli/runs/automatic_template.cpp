@@ -14,6 +14,13 @@ using namespace internal;
 
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings, TemplateUse use) {
+  if (!source.path.empty() && use == TemplateUse::curved_cells) {
+    LoadedCells cells = load_cells(source.path, warnings, true, run.references);
+    if (auto* linear = std::get_if<VolumeMesh>(&cells)) return {std::move(*linear), std::nullopt};
+    auto& file = std::get<HighOrderFile>(cells);
+    VolumeMesh labels = labels_of(file);
+    return {std::move(labels), std::nullopt, std::move(file.mesh)};
+  }
   if (!source.path.empty()) return {load_volume(source.path, warnings, true, run.references), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   if (options.time_limit_seconds > 0 && !run.checkpoint.empty())

@@ -20,11 +20,13 @@ struct TemplateSource {
 struct LoadedTemplate {
   VolumeMesh mesh;  ///< no cells: interrupted while it was being made
   std::optional<AutomaticFitResult> made;
+  std::optional<HighOrderMesh> curved{};  ///< curved cells that were read, on the vertices of `mesh`
 };
 
 /// Reads a template, or makes one and reports the progress.
 ///
-/// options, use  how the template is made; `cells` is taken from the source instead.
+/// options, use  how the template is made; `cells` is taken from the source instead. Curved cells are read only for
+///               `curved_cells`.
 /// UsageError: a template would have to be made from points. EndedEarly: the time limit ended it before there was one.
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings,

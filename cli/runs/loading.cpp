@@ -6,6 +6,7 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/curved_file.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/target/region_matching.h"
 #include "subvol/io/mesh_io.h"
@@ -52,7 +53,8 @@ Content content_of(const std::filesystem::path& path, std::vector<std::string>& 
 }
 
 [[noreturn]] void refuse_curved(const std::filesystem::path& path, const std::string& wanted) {
-  throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but " + wanted);
+  throw InputError(path.string() + ": curved cells, which `check`, `convert`, `optimize` and `fit --order` read, but " +
+                   wanted);
 }
 
 /// InputError: all of the mesh is in one place.
@@ -184,18 +186,33 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
   return boundary;
 }
 
-VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+LoadedCells load_cells(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
   const auto refuse_surface = [&] {
     throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
   };
   require_known_file(path);
   if (is_surface_or_points(path)) refuse_surface();
-  Content content = content_of(path, warnings, check, array_of(references));
-  if (std::holds_alternative<PolygonMesh>(content)) refuse_surface();
-  if (!std::holds_alternative<VolumeMesh>(content))
+  LoadedMesh mesh = load_mesh(path, warnings, check, references);
+  if (std::holds_alternative<PolygonMesh>(mesh)) refuse_surface();
+  if (auto* linear = std::get_if<VolumeMesh>(&mesh)) return std::move(*linear);
+  return std::get<HighOrderFile>(std::move(mesh));
+}
+
+VolumeMesh labels_of(const HighOrderFile& file) {
+  VolumeMesh labels = file.mesh.straight_sided();
+  labels.references = file.references;
+  labels.face_groups = file.face_groups;
+  labels.regions = file.regions;
+  return labels;
+}
+
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                       const std::string& references) {
+  LoadedCells cells = load_cells(path, warnings, check, references);
+  if (!std::holds_alternative<VolumeMesh>(cells))
     refuse_curved(path, "linear cells are wanted: " + volume_mesh_formats());
-  return as_chosen(std::get<VolumeMesh>(std::move(content)), references);
+  return std::get<VolumeMesh>(std::move(cells));
 }
 
 std::vector<Group> regions_of(const VolumeMesh& mesh) {
@@ -215,6 +232,17 @@ VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
   std::vector<char> kept(mesh.num_cells());
   for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = reference_of(mesh, c) == wanted;
   return kept_cells(mesh, kept);
+}
+
+HighOrderFile cells_of_region(const HighOrderFile& file, const std::string& region) {
+  const VolumeMesh all = labels_of(file);
+  const int wanted = number_of_region(regions_of(all), region, "--region");
+  std::vector<Index> cells;
+  for (std::size_t c = 0; c < all.num_cells(); ++c)
+    if (reference_of(all, c) == wanted) cells.push_back(static_cast<Index>(c));
+  VolumeMesh labels = cells_of_region(all, region);  // of the same cells, with their vertices in the same order
+  return {internal::cells_of(file.mesh, cells), std::move(labels.references), std::move(labels.face_groups),
+          std::move(labels.regions)};
 }
 
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings,

@@ -76,6 +76,15 @@ inline constexpr const char* kNoReferences = "none";
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 
+/// Cells of a mesh, linear or curved.
+using LoadedCells = std::variant<VolumeMesh, HighOrderFile>;
+/// Loads linear cells as `load_volume`, or curved ones as `load_high_order`.
+LoadedCells load_cells(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
+                       const std::string& references = {});
+
+/// Returns the straight-sided cells of a curved mesh, with its labels.
+VolumeMesh labels_of(const HighOrderFile& file);
+
 /// Returns the regions of a mesh: their names and their references as numbers.
 std::vector<Group> regions_of(const VolumeMesh& mesh);
 
@@ -85,6 +94,7 @@ void require_regions(std::span<const Output> outputs, std::span<const Group> reg
 /// Returns the cells of one region, which is given by its name or its number. UsageError: there is none; the message
 /// lists the regions.
 VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region);
+HighOrderFile cells_of_region(const HighOrderFile& file, const std::string& region);
 
 /// `read_curved`; InputError also if the whole mesh is at one point. warnings: may be null.
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr,

@@ -20,16 +20,19 @@ bool has_few_inverted_cells(const VolumeMesh& mesh) {
   return inverted > 0 && 2 * static_cast<std::size_t>(inverted) < mesh.num_cells();
 }
 
-void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
-                       std::vector<std::string>& warnings) {
+namespace {
+
+/// Runs untangle(progress, cancelled), which returns an `UntangledStart`, and reports what it did.
+template <class Untangle>
+void untangle_and_report(const std::string& path, const RunOptions& run, std::vector<std::string>& warnings,
+                         const Untangle& untangle) {
   ProgressTeller teller(run.progress, run.quiet);
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
+  const auto progress = [&](const FitProgress& now) {
+    teller.tell(now);
     return !interrupted();
   };
-  options.cancelled = interrupted;
   try {
-    const UntangledStart start = untangle_before_fit(mesh, options);
+    const UntangledStart start = untangle(progress, interrupted);
     if (start.ended_early())
       throw EndedEarly(path + ": the work was ended while its cells were made valid; " + std::to_string(start.left) +
                            " were not yet, and there is nothing to write",
@@ -41,6 +44,28 @@ void untangle_template(const std::string& path, const RunOptions& run, OptimizeO
     throw InputError(path + ": " + error.what());
   }
   teller.finish();
+}
+
+}  // namespace
+
+void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
+                       std::vector<std::string>& warnings) {
+  untangle_and_report(path, run, warnings, [&](const auto& progress, const auto& cancelled) {
+    options.progress = progress;
+    options.cancelled = cancelled;
+    return untangle_before_fit(mesh, options);
+  });
+}
+
+void untangle_template(const std::string& path, const RunOptions& run, const OptimizeOptions& options,
+                       const VolumeMesh& labels, HighOrderMesh& mesh, std::vector<std::string>& warnings) {
+  untangle_and_report(path, run, warnings, [&](const auto& progress, const auto& cancelled) {
+    return untangle_before_fit(mesh, labels,
+                               {.time_limit_seconds = options.time_limit_seconds,
+                                .progress = progress,
+                                .cancelled = cancelled,
+                                .log = options.log});
+  });
 }
 
 }  // namespace subvol::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/optimize_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 
@@ -21,5 +22,9 @@ bool has_few_inverted_cells(const VolumeMesh& mesh);
 /// InputError: some cells cannot be made valid. EndedEarly: Ctrl-C or the time limit came first.
 void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
                        std::vector<std::string>& warnings);
+
+/// Does the same for curved cells. labels: the same cells with their references and groups.
+void untangle_template(const std::string& path, const RunOptions& run, const OptimizeOptions& options,
+                       const VolumeMesh& labels, HighOrderMesh& mesh, std::vector<std::string>& warnings);
 
 }  // namespace subvol::cli

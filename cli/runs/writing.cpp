@@ -218,6 +218,11 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 }
 
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
+  if (output.part == Part::region) {
+    Output whole = output;
+    whole.part = Part::result;
+    return write_output(whole, cells_of_region(file, output.region), options);
+  }
   const HighOrderMesh& mesh = file.mesh;
   require_for_curved_cells(output);
   if (output.part == Part::boundary && output.extension == ".xdmf")

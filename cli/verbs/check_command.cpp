@@ -62,7 +62,8 @@ Checked check_high_order(const CheckArguments& arguments, const HighOrderFile& f
   const MeshCheckOptions options{.labels = {file.references, file.regions}, .progress = progress};
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, options); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
-  if (holds_exact_map(arguments.mesh)) checked.lagrange = check_lagrange_cells(arguments.mesh, mesh);
+  if (arguments.region.empty() && holds_exact_map(arguments.mesh))
+    checked.lagrange = check_lagrange_cells(arguments.mesh, mesh);
   return checked;
 }
 
@@ -142,9 +143,12 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   std::vector<std::string> warnings;
   LoadedMesh mesh = load_mesh(arguments.mesh, warnings, false, arguments.run.references);
   if (!arguments.region.empty()) {
-    auto* cells = std::get_if<VolumeMesh>(&mesh);
-    if (!cells) throw UsageError("--region: " + arguments.mesh + " holds no linear cells to choose from");
-    *cells = cells_of_region(*cells, arguments.region);
+    if (auto* cells = std::get_if<VolumeMesh>(&mesh))
+      *cells = cells_of_region(*cells, arguments.region);
+    else if (auto* curved = std::get_if<HighOrderFile>(&mesh))
+      *curved = cells_of_region(*curved, arguments.region);
+    else
+      throw UsageError("--region: " + arguments.mesh + " is a surface, which has no cells to choose from");
   }
   if (const auto* surface = std::get_if<PolygonMesh>(&mesh)) return check_surface(arguments, *surface, verb, warnings);
   std::optional<Target> target;

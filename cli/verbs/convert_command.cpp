@@ -85,11 +85,12 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   require_choice_of_references(arguments.input, arguments.run.references);
   LoadedMesh mesh = load_mesh(arguments.input, warnings, true, arguments.run.references);
   auto* cells = std::get_if<VolumeMesh>(&mesh);
-  if (!arguments.region.empty() && !cells)
-    throw UsageError("--region: " + arguments.input + " holds no linear cells to choose from");
+  if (!arguments.region.empty() && std::holds_alternative<PolygonMesh>(mesh))
+    throw UsageError("--region: " + arguments.input + " is a surface, which has no cells to choose from");
   if (cells) {
     convert_volume(arguments, std::move(*cells), outputs, writing, warnings);
-  } else if (const auto* curved = std::get_if<HighOrderFile>(&mesh)) {
+  } else if (auto* curved = std::get_if<HighOrderFile>(&mesh)) {
+    if (!arguments.region.empty()) *curved = cells_of_region(*curved, arguments.region);
     status = convert_high_order(arguments, *curved, outputs, writing, warnings);
   } else {
     convert_surface(arguments, std::get<PolygonMesh>(mesh), outputs, writing);

@@ -20,6 +20,7 @@
 #include "subvol/base/process_memory.h"
 #include "subvol/base/version.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/mesh/pyramids.h"
@@ -49,7 +50,7 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
 
 /// seconds: the part of the time limit that has been used.
 HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bool keep_states, double seconds,
-                       const Target& target, const VolumeMesh& template_mesh) {
+                       const Target& target, const LoadedTemplate& start) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;
@@ -62,7 +63,9 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   };
   options.cancelled = interrupted;
   HighOrderFitResult result =
-      std::visit([&](const auto& geometry) { return fit_high_order(geometry, template_mesh, options); }, target);
+      start.curved
+          ? fit_high_order(std::get<TriangleMesh>(target), *start.curved, start.mesh, options)
+          : std::visit([&](const auto& geometry) { return fit_high_order(geometry, start.mesh, options); }, target);
   teller.finish();
   if (!interrupted()) end_on_interrupt();
   return result;
@@ -115,7 +118,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (arguments.run.outputs.empty() && arguments.run.report.empty())
     throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
-  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation, Part::boundary});
+  std::vector<Output> outputs =
+      checked_outputs(arguments.run, {Part::cutaway, Part::animation, Part::boundary, Part::region});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::size_t told = 0;
@@ -143,19 +147,26 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (loaded.made && !arguments.run.quiet) std::cerr << template_text(*loaded.made);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   refuse_impossible(outputs, arguments, template_mesh);
+  require_regions(outputs, regions_of(template_mesh));
+  if (loaded.curved && is_cloud(target))
+    throw UsageError(arguments.template_mesh.path + ": curved cells are drawn to a surface, not to points");
   const double read_seconds = seconds_since(start) - template_seconds;
   Json input{{"target", describe(arguments.target, target)}};
   input[arguments.untangles ? "mesh" : "template"] = describe(arguments.template_mesh.path, template_mesh);
   if (arguments.untangles && !arguments.run.report.empty())
-    input["quality"] = quality_json(measure_quality(template_mesh));
+    input["quality"] = quality_json(loaded.curved ? internal::measure_quality(*loaded.curved) : measure_quality(template_mesh));
   Checkpointing checkpointing(
       arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
   const Clock::time_point untangle_start = Clock::now();
-  if (arguments.untangles || has_few_inverted_cells(template_mesh)) {
+  if (loaded.curved || arguments.untangles || has_few_inverted_cells(template_mesh)) {
+    const OptimizeOptions untangling{.time_limit_seconds = arguments.fit.time_limit_seconds,
+                                     .log = checkpointing.log()};
+    const std::string& path = arguments.template_mesh.path;
     try {
-      untangle_template(arguments.template_mesh.path, arguments.run,
-                        {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()},
-                        template_mesh, warnings);
+      if (loaded.curved)
+        untangle_template(path, arguments.run, untangling, template_mesh, *loaded.curved, warnings);
+      else
+        untangle_template(path, arguments.run, untangling, template_mesh, warnings);
     } catch (const EndedEarly&) {
       checkpointing.finish(warnings);
       tell_warnings();
@@ -165,7 +176,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const double untangle_seconds = seconds_since(untangle_start);
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result =
-      fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start), target, template_mesh);
+      fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start), target, loaded);
   const double fit_seconds = seconds_since(fit_start);
   FitReport& report = result.report;
   checkpointing.finish(warnings);

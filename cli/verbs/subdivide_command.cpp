@@ -45,10 +45,12 @@ void warn_of_volumes(const VolumeMesh& cage, const VolumeMesh& fine, std::vector
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
-  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway, Part::boundary});
+  std::vector<Output> outputs =
+      checked_outputs(arguments.run, {Part::cage, Part::cutaway, Part::boundary, Part::region});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
+  require_regions(outputs, regions_of(cage));
   const Marks read = marks_of(cage);
   const Json input{{"mesh", describe(arguments.mesh, cage)}};
   if (arguments.crease_angle_degrees) {
@@ -102,11 +104,12 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
   add_references_option(*verb, arguments->run);
-  add_output_options(*verb, arguments->run,
-                     "Refined mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for\n"
-                         "the faces of the boundary with their groups; may be given\n"
-                         "several times");
+  add_output_options(
+      *verb, arguments->run,
+      "Refined mesh, or its surface, by extension: " + output_formats() +
+          "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for\n"
+          "the faces of the boundary with their groups, region:NAME:FILE for the cells of one region; may be\n"
+          "given several times");
   add_writing_options(*verb, arguments->writing);
   verb->add_option("--report", arguments->run.report, "Write what was done and what is true of the result")
       ->type_name("FILE.json");

@@ -7,6 +7,7 @@
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_sweep.h"
 #include "subvol/fit/energies/jacobian_hinge.h"
+#include "subvol/fit/energies/regularised_barrier.h"
 #include "subvol/fit/energies/step_limit.h"
 
 #include <Eigen/LU>
@@ -221,7 +222,8 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 /// Returns the energy at the nodes, using kernel(batches, count) at all points. With kBack, the contributions of the
 /// batches to their modes are left in local_. Calls per_point(group number, batch, q, point) after each point.
 template <bool kBack, class Kernel, class PerPoint>
-double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
+double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel& kernel,
+                                       const PerPoint& per_point) const {
   constexpr int kAtOnce = 2;
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
@@ -265,12 +267,21 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
   });
 }
 
-double HighOrderEnergy::value(std::span<const Vec3> nodes) const {
-  return integrate<false>(nodes, kernels_->energy, kNothingMore);
+/// Does so with the present distortion or the regularized barrier.
+template <bool kBack, class PerPoint>
+double HighOrderEnergy::integrate(std::span<const Vec3> nodes, int derivatives, const PerPoint& per_point) const {
+  const auto regularised = [&](DistortionBatch* batches, int count) {
+    derivatives < 2 ? regularised_gradient(batches, count, epsilon_) : regularised_hessian(batches, count, epsilon_);
+  };
+  const auto kernel = std::array{kernels_->energy, kernels_->gradient, kernels_->hessian}[derivatives];
+  return epsilon_ > 0 ? integrate_with<kBack>(nodes, regularised, per_point)
+                      : integrate_with<kBack>(nodes, kernel, per_point);
 }
 
+double HighOrderEnergy::value(std::span<const Vec3> nodes) const { return integrate<false>(nodes, 0, kNothingMore); }
+
 double HighOrderEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
-  const double energy = integrate<true>(nodes, kernels_->gradient, kNothingMore);
+  const double energy = integrate<true>(nodes, 1, kNothingMore);
   if (std::isfinite(energy)) gather_nodes(scale * cell_share(), gradient);
   return energy;
 }
@@ -317,13 +328,13 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
     keep_frozen(frozen, kSize, &group.frozen[kSize * (b * group.num_points() + q)]);
     if (hinge_weight_ > 0) freeze_hinge(group, b, q, batch, scale * cell_share() * hinge_weight_at(group));
   };
-  const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);
+  const double energy = integrate<true>(nodes, 2, keep_point);
   gather_nodes(scale * cell_share(), gradient);
   return energy;
 }
 
 double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
-  return kernels_->coupled ? linearize_as<true>(nodes, scale, gradient) : linearize_as<false>(nodes, scale, gradient);
+  return is_coupled() ? linearize_as<true>(nodes, scale, gradient) : linearize_as<false>(nodes, scale, gradient);
 }
 
 template <bool kCoupled>
@@ -353,7 +364,7 @@ void HighOrderEnergy::multiply_as(std::span<const Vec3> in) const {
 }
 
 void HighOrderEnergy::multiply(std::span<const Vec3> in, std::span<Vec3> out) const {
-  kernels_->coupled ? multiply_as<true>(in) : multiply_as<false>(in);
+  is_coupled() ? multiply_as<true>(in) : multiply_as<false>(in);
   std::fill(out.begin(), out.end(), Vec3::Zero());
   gather_nodes(1, out);
 }
@@ -409,6 +420,7 @@ void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const
 }
 
 double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
+  if (epsilon_ > 0) return limit;
   StepLimit steps(limit);
   for_each_pair(nodes, direction, [&](std::size_t, std::size_t, std::size_t, int, const Mat3& j, const Mat3& d) {
     steps.admit(j, d);
@@ -427,6 +439,7 @@ void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::si
 }
 
 bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) {
+  if (epsilon_ > 0) return false;
   std::atomic<bool> changed{false};
   for_each_pair(nodes, direction,
                 [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
@@ -447,7 +460,45 @@ bool HighOrderEnergy::stiffen(std::span<const Index> cells) {
 }
 
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {
+  return epsilon_ > 0 ? std::vector<Index>() : not_certified(nodes);
+}
+
+std::vector<Index> HighOrderEnergy::not_certified(std::span<const Vec3> nodes) const {
   return certify(*space_, nodes).not_certified;
+}
+
+void HighOrderEnergy::set_regularisation(double epsilon) {
+  if (!(epsilon >= 0) || !std::isfinite(epsilon))
+    throw InputError("HighOrderEnergy: epsilon must be 0 or positive and finite");
+  epsilon_ = epsilon;
+}
+
+bool HighOrderEnergy::has_emphasis() const {
+  return emphasis_ > 0 || std::ranges::any_of(own_emphasis_, [](double k) { return k > 0; });
+}
+
+void HighOrderEnergy::set_weights(std::span<const double> weights) {
+  if (weights.size() != space_->num_cells())
+    throw InputError("HighOrderEnergy: expected one weight per cell (" + std::to_string(space_->num_cells()) +
+                     "), got " + std::to_string(weights.size()));
+  if (!std::ranges::all_of(weights, [](double w) { return w > 0 && std::isfinite(w); }))
+    throw InputError("HighOrderEnergy: weights must be positive and finite");
+  if (has_emphasis()) throw InputError("HighOrderEnergy: an emphasis does not go with weights of cells");
+  cell_weights_.assign(weights.begin(), weights.end());
+  weigh_points({});
+}
+
+void HighOrderEnergy::least_determinants(std::span<const Vec3> nodes, std::span<double> least) const {
+  if (least.size() != space_->num_cells()) throw InputError("HighOrderEnergy: expected one place per cell");
+  std::ranges::fill(least, std::numeric_limits<double>::infinity());
+  integrate<false>(nodes, 0, [&](std::size_t g, std::size_t b, std::size_t, const DistortionBatch& batch) {
+    for (int l = 0; l < kLanes; ++l) {
+      Mat3 j;
+      for (int e = 0; e < 9; ++e) j(e / 3, e % 3) = batch.jacobian[e][l];
+      double& lowest = least[groups_[g].batches[b][l]];
+      lowest = std::min(lowest, j.determinant());
+    }
+  });
 }
 
 void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasis) {
@@ -456,13 +507,18 @@ void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasi
   weigh_points(nodes);
 }
 
-/// Weighs the points by the shape of their cells at these nodes; the mean of all weights is 1.
+/// Weighs the points by the weights of their cells and, with an emphasis, by the shape of the cells at these nodes; the
+/// mean of all weights is 1.
 void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
   constexpr double kFairShape = 0.6;
   for (CellGroup& group : groups_) group.point_weights.clear();
-  if (emphasis_ == 0 && std::ranges::all_of(own_emphasis_, [](double k) { return k == 0; })) return;
+  if (!has_emphasis() && cell_weights_.empty()) return;
   std::vector<std::vector<Wide>> weights;
-  for (const CellGroup& group : groups_) weights.emplace_back(group.num_points() * group.batches.size());
+  for (const CellGroup& group : groups_) {
+    auto& of_group = weights.emplace_back(group.num_points() * group.batches.size(), Wide{} + 1.0);
+    for (std::size_t i = 0; i < of_group.size() && !cell_weights_.empty(); ++i)
+      for (int l = 0; l < kLanes; ++l) of_group[i][l] = cell_weights_[group.batches[i / group.num_points()][l]];
+  }
   const auto weigh = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     Wide& weight = weights[g][b * groups_[g].num_points() + q];
     for (int l = 0; l < kLanes; ++l) {
@@ -470,10 +526,10 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
       for (int e = 0; e < 9; ++e) f(e / 3, e % 3) = batch.jacobian[e][l];
       const double shape = f.determinant() / (f.col(0).norm() * f.col(1).norm() * f.col(2).norm());
       const double lack = shape > 0 ? std::max(0.0, 1 - shape / kFairShape) : 1;  // 1 also for NaN
-      weight[l] = 1 + std::max(emphasis_, own_emphasis_[groups_[g].batches[b][l]]) * lack * lack;
+      weight[l] *= 1 + std::max(emphasis_, own_emphasis_[groups_[g].batches[b][l]]) * lack * lack;
     }
   };
-  integrate<false>(nodes, kernels_->energy, weigh);
+  if (has_emphasis()) integrate<false>(nodes, 0, weigh);
   double sum = 0;
   for (std::size_t g = 0; g < groups_.size(); ++g)
     for (std::size_t i = 0; i < weights[g].size(); ++i)

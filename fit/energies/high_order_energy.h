@@ -43,7 +43,7 @@ struct CellGroup;
 /// as 27 numbers per point (30 if stretches are coupled, 9 more with a hinge) and never assembled. The results have the
 /// same bits for any number of threads. Only one caller at a time may use an object, const functions included: they
 /// share a buffer.
-class HighOrderEnergy final : public VolumeTerm {
+class HighOrderEnergy final : public RegularisedTerm {
  public:
   /// space  must outlive the energy.
   /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError.
@@ -72,6 +72,11 @@ class HighOrderEnergy final : public VolumeTerm {
   /// Quadrature points per direction of each cell, including refinements by `densify`.
   std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  void set_regularisation(double epsilon) override;
+  /// Multiplies the weights w_cq of the cells' points. InputError also with an emphasis, whose weights depend on nodes.
+  void set_weights(std::span<const double> weights) override;
+  void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const override;
+  std::vector<Index> not_certified(std::span<const Vec3> nodes) const override;
   /// True: a curved cell that is certified after a step, but not after twice that step, may be nearly inverted between
   /// its points, and then no direction leads on from there. After half the step, its least determinant is still at
   /// least about half of what it was.
@@ -92,6 +97,10 @@ class HighOrderEnergy final : public VolumeTerm {
   void set_most_own_emphasis(double most) { most_own_emphasis_ = most; }
 
  private:
+  bool is_coupled() const { return epsilon_ > 0 || kernels_->coupled; }
+  bool has_emphasis() const;
+  template <bool kBack, class PerPoint>
+  double integrate(std::span<const Vec3> nodes, int derivatives, const PerPoint& per_point) const;
   template <bool kCoupled>
   double linearize_as(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient);
   template <bool kCoupled>
@@ -104,7 +113,7 @@ class HighOrderEnergy final : public VolumeTerm {
   double hinge_weight_at(const CellGroup& group) const;
   void stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane);
   template <bool kBack, class Kernel, class PerPoint>
-  double integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
+  double integrate_with(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
   double cell_share() const { return 1.0 / num_cells_; }
   template <class PerPoint>
   void for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction, const PerPoint& per_point) const;
@@ -121,6 +130,8 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<int> points_;
   const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
   double floor_ = kHessianFloor;
+  double epsilon_ = 0;                ///< of the regularized barrier; 0: that of `kernels_`
+  std::vector<double> cell_weights_;  ///< empty: all cells weigh the same
   double emphasis_ = 0, most_own_emphasis_ = 256;
   double hinge_weight_ = 0, hinge_threshold_ = 0;
   std::vector<double> own_emphasis_;  ///< per cell: emphasis by quadrature refinement; 0: not refined

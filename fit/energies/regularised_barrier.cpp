@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/energies/regularised_barrier.h"
 
+#include "subvol/fit/energies/singular_values.h"
+
+#include <Eigen/Geometry>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 namespace subvol::internal {
 
@@ -15,7 +21,85 @@ double chi_of(double determinant, double root, double epsilon) {
   return determinant > 0 ? 0.5 * (determinant + root) : 0.5 * epsilon * (epsilon / (root - determinant));
 }
 
+/// J = U diag(s) V^T with rotations U and V; s[2] may be negative.
+struct SignedSingularValues {
+  Mat3 u, v;
+  Vec3 s;
+};
+
+/// Completes the decomposition in one lane. The two larger singular values give two columns of U, and these the third:
+/// it could not be found from a value near 0.
+SignedSingularValues signed_values(const Singular& singular, int lane) {
+  Mat3 v, jv;
+  for (int i = 0; i < 3; ++i)
+    for (int r = 0; r < 3; ++r) {
+      v(r, i) = singular.v[i][r][lane];
+      jv(r, i) = singular.jv[i][r][lane];
+    }
+  std::array<int, 3> order{0, 1, 2};
+  std::ranges::sort(order, [&](int a, int b) { return singular.square[a][lane] > singular.square[b][lane]; });
+  SignedSingularValues result;
+  for (int i = 0; i < 2; ++i) result.v.col(i) = v.col(order[i]);
+  result.v.col(2) = result.v.col(0).cross(result.v.col(1));
+  const Vec3 first = jv.col(order[0]), second = jv.col(order[1]);
+  constexpr double kNone = 1e-140;
+  result.s[0] = first.norm();
+  result.u.col(0) = result.s[0] > kNone ? Vec3(first / result.s[0]) : Vec3(Vec3::UnitX());
+  const Vec3 across = second - result.u.col(0).dot(second) * result.u.col(0);
+  result.s[1] = across.norm();
+  result.u.col(1) = result.s[1] > kNone ? Vec3(across / result.s[1]) : Vec3(result.u.col(0).unitOrthogonal());
+  result.u.col(2) = result.u.col(0).cross(result.u.col(1));
+  const double sign = result.v.col(2).dot(v.col(order[2])) < 0 ? -1 : 1;
+  result.s[2] = sign * result.u.col(2).dot(jv.col(order[2]));
+  return result;
+}
+
+/// Evaluates the barrier for a batch of another form, and copies its value and first derivative there.
+RegularisedBatch evaluated(DistortionBatch& batch, double epsilon) {
+  RegularisedBatch barrier;
+  for (int k = 0; k < 9; ++k) std::copy_n(batch.jacobian[k], kLanes, barrier.jacobian[k]);
+  regularised_barrier(barrier, epsilon);
+  std::copy_n(barrier.energy, kLanes, batch.energy);
+  for (int k = 0; k < 9; ++k) std::copy_n(barrier.stress[k], kLanes, batch.stress[k]);
+  return barrier;
+}
+
+void fill_second(const RegularisedBatch& barrier, DistortionBatch& batch) {
+  constexpr double kLeastSquare = 1e-200;
+  Wide j[9];
+  for (int k = 0; k < 9; ++k) j[k] = load_wide(batch.jacobian[k]);
+  Wide square{};
+  for (const Wide& entry : j) square += entry * entry;
+  for (int k = 0; k < 9; ++k) j[k] = square > kLeastSquare ? j[k] : wide(k % 4 == 0 ? 1e-90 : 0.0);
+  Singular singular;
+  decompose(j, singular);
+  for (int l = 0; l < kLanes; ++l) {
+    const auto [u, v, s] = signed_values(singular, l);
+    const Vec3 c(s[1] * s[2], s[2] * s[0], s[0] * s[1]);
+    const double alpha = barrier.alpha[l], beta = barrier.beta[l], gamma = barrier.gamma[l];
+    for (int i = 0; i < 3; ++i) {
+      const int k = (i + 1) % 3;
+      for (int r = 0; r < 3; ++r) {
+        batch.u[3 * r + i][l] = u(r, i);
+        batch.v[3 * r + i][l] = v(r, i);
+      }
+      batch.stretch[i][l] = alpha + 2 * beta * s[i] * c[i] + gamma * c[i] * c[i];
+      batch.coupling[i][l] = beta * (s[i] * c[k] + s[k] * c[i]) + gamma * c[i] * c[k];
+      batch.pair_same[i][l] = alpha;
+      batch.pair_cross[i][l] = 0;
+    }
+  }
+}
+
 }  // namespace
+
+void regularised_gradient(DistortionBatch* batches, int count, double epsilon) {
+  for (int n = 0; n < count; ++n) evaluated(batches[n], epsilon);
+}
+
+void regularised_hessian(DistortionBatch* batches, int count, double epsilon) {
+  for (int n = 0; n < count; ++n) fill_second(evaluated(batches[n], epsilon), batches[n]);
+}
 
 void regularised_barrier(RegularisedBatch& batch, double epsilon) {
   const double (&j)[9][kLanes] = batch.jacobian;

@@ -33,4 +33,14 @@ struct RegularisedBatch {
 /// Fills everything. epsilon > 0, dimensionless.
 void regularised_barrier(RegularisedBatch& batch, double epsilon);
 
+/// The same in the form of the other distortions, with coupled stretches. With J = U diag(s) V^T, U and V rotations and
+/// s_2 of the sign of D, C = U diag(D / s_i) V^T, so that
+///
+///   stretch_i = alpha + 2 beta D + gamma c_i^2,  coupling_ij = beta (s_i c_j + s_j c_i) + gamma c_i c_j,
+///   pair_same = alpha,  pair_cross = 0,  c_i = D / s_i
+///
+/// `regularised_gradient` fills `energy` and `stress`, `regularised_hessian` everything. count: number of batches.
+void regularised_gradient(DistortionBatch* batches, int count, double epsilon);
+void regularised_hessian(DistortionBatch* batches, int count, double epsilon);
+
 }  // namespace subvol::internal

@@ -322,7 +322,10 @@ void VolumeEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& ma
 }
 
 std::vector<Index> VolumeEnergy::uncertified(std::span<const Vec3> nodes) const {
-  if (epsilon_ > 0) return {};
+  return epsilon_ > 0 ? std::vector<Index>() : not_certified(nodes);
+}
+
+std::vector<Index> VolumeEnergy::not_certified(std::span<const Vec3> nodes) const {
   return certify(nodes, *mesh_).not_certified;
 }
 

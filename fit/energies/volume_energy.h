@@ -26,10 +26,7 @@ namespace subvol::internal {
 /// Cells run in parallel color by color (no two cells of one color share a vertex), those of a color in fixed order:
 /// the results have the same bits for any number of threads. The evaluations allocate only one partial sum per 8 cells,
 /// and `add_gradient` a copy of the gradient.
-///
-/// With a regularization epsilon > 0 the density is that of `regularised_barrier.h`, which is finite even if cells are
-/// inverted, so that minimizing it untangles them. Steps are then not limited, and no cell counts as uncertified.
-class VolumeEnergy final : public VolumeTerm {
+class VolumeEnergy final : public RegularisedTerm {
  public:
   /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices that share a cell
   ///       than an Index can number (a hex mesh of about 8e7 vertices).
@@ -55,14 +52,11 @@ class VolumeEnergy final : public VolumeTerm {
   /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  /// epsilon  0 (initially): the distortion's own barrier; > 0: the regularized one. InputError: negative or not
-  ///          finite.
-  void set_regularisation(double epsilon);
-  /// Sets w_c from one positive weight per cell; only ratios matter. InputError: another number of weights, or a weight
-  /// that is not positive and finite.
-  void set_weights(std::span<const double> weights);
-  /// Writes the least det J_cq of each cell to `least`, which must have one entry per cell (else InputError).
-  void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const;
+  void set_regularisation(double epsilon) override;
+  /// Sets w_c.
+  void set_weights(std::span<const double> weights) override;
+  void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const override;
+  std::vector<Index> not_certified(std::span<const Vec3> nodes) const override;
 
   /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `distortion.h`) to
   /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible; otherwise it returns +infinity and

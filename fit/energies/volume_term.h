@@ -65,4 +65,22 @@ class VolumeTerm {
   virtual void densify(std::span<const Index> cells, std::span<const Vec3> nodes) = 0;
 };
 
+/// A volume term that can also be minimized from inverted cells. With a regularization epsilon > 0 its density is that
+/// of `regularised_barrier.h`, which is finite everywhere, so that minimizing it untangles the cells. Steps are then
+/// not limited, and `uncertified` returns nothing.
+class RegularisedTerm : public VolumeTerm {
+ public:
+  /// epsilon  0 (initially): the distortion's own barrier; > 0: the regularized one. InputError: negative or not
+  ///          finite.
+  virtual void set_regularisation(double epsilon) = 0;
+  /// Sets the weights of the cells; only ratios matter. InputError: another number of weights, or a weight that is not
+  /// positive and finite.
+  virtual void set_weights(std::span<const double> weights) = 0;
+  /// Writes the least determinant at each cell's quadrature points to `least`, which must have one entry per cell (else
+  /// InputError).
+  virtual void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const = 0;
+  /// Returns the cells that are not certified, ascending, with and without a regularization.
+  virtual std::vector<Index> not_certified(std::span<const Vec3> nodes) const = 0;
+};
+
 }  // namespace subvol::internal

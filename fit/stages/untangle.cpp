@@ -2,7 +2,6 @@
 #include "subvol/fit/stages/untangle.h"
 
 #include "subvol/base/format.h"
-#include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/energies/regularised_barrier.h"
 #include "subvol/fit/stages/fit_report.h"
 
@@ -29,13 +28,12 @@ constexpr double kLeastRise = 0.01;
 /// The cells of a problem and their state between rounds.
 class TangledCells {
  public:
-  TangledCells(FitProblem& problem, const VolumeMesh& mesh)
+  TangledCells(FitProblem& problem, std::size_t num_cells)
       : problem_(problem),
-        energy_(dynamic_cast<VolumeEnergy&>(*problem.volume)),
-        mesh_(mesh),
+        energy_(dynamic_cast<RegularisedTerm&>(*problem.volume)),
         nodes_(problem.nodes.num_rows()),
-        least_(mesh.num_cells()),
-        weights_(mesh.num_cells(), 1) {}
+        least_(num_cells),
+        weights_(num_cells, 1) {}
   TangledCells(const TangledCells&) = delete;
   TangledCells& operator=(const TangledCells&) = delete;
   ~TangledCells() { energy_.set_regularisation(0); }
@@ -43,7 +41,7 @@ class TangledCells {
   /// Certifies the cells of a state and measures their determinants; returns true if every cell is certified.
   bool look(std::span<const Vec3> x) {
     problem_.apply_nodes(x, nodes_);
-    uncertified_ = certify(nodes_, mesh_).not_certified;
+    uncertified_ = energy_.not_certified(nodes_);
     if (uncertified_.empty()) return true;
     energy_.least_determinants(nodes_, least_);
     // Cells that are positive at all their points but still fail need more points to show where they invert.
@@ -51,7 +49,7 @@ class TangledCells {
     for (const Index c : uncertified_)
       if (least_[c] > 0) hidden.push_back(c);
     if (!hidden.empty()) {
-      energy_.densify(hidden);
+      energy_.densify(hidden, nodes_);
       energy_.least_determinants(nodes_, least_);
     }
     determinant_ = *std::min_element(least_.begin(), least_.end());
@@ -73,8 +71,7 @@ class TangledCells {
 
  private:
   FitProblem& problem_;
-  VolumeEnergy& energy_;
-  const VolumeMesh& mesh_;
+  RegularisedTerm& energy_;
   std::vector<Vec3> nodes_;
   std::vector<double> least_, weights_;
   std::vector<Index> uncertified_;
@@ -83,9 +80,9 @@ class TangledCells {
 
 }  // namespace
 
-UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
+UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const UntangleOptions& options,
                         const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report) {
-  TangledCells cells(problem, mesh);
+  TangledCells cells(problem, num_cells);
   if (cells.look(x)) return {};
   double epsilon = std::max(kShareOfWorst * std::abs(cells.determinant()), kLeastEpsilon);
   std::size_t fewest = cells.uncertified().size();

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/solver/fit_problem.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/stage_runner.h"
 
+#include <cstddef>
 #include <vector>
 
 namespace subvol::internal {
@@ -24,11 +25,11 @@ struct UntangleResult {
 /// to the worst determinant, until every cell is certified. Cells that are positive at their quadrature points but not
 /// certified get more points; cells that still fail when a round has nearly stopped decreasing E get more weight.
 ///
-/// problem   its volume term is a VolumeEnergy over `mesh`; on return, its regularization is off.
+/// problem   its volume term is a RegularisedTerm of `num_cells` cells; on return, its regularization is off.
 /// record    name, level and cells of the reported stages, one per round.
 /// x         any finite start; receives the result, certified or not.
 /// A round counts as a gain if fewer cells fail than in any round before or the worst determinant rises.
-UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
+UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const UntangleOptions& options,
                         const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report);
 
 }  // namespace subvol::internal

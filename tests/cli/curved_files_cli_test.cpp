@@ -3,6 +3,7 @@
 
 #include "subvol/export/high_order_file.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
 
 #include <catch2/catch.hpp>
@@ -100,4 +101,51 @@ TEST_CASE("check: Lagrange cells of a .vtu are judged as they stand", "[cli]") {
   CHECK(inverted.status == 1);
   CHECK_THAT(inverted.out, Contains("0 of 1 certified") && Contains("NOT VALID"));
   CHECK(place.json("inverted.json")["valid"] == false);
+}
+
+TEST_CASE("optimize: curved cells of other programs are untangled, and their boundary keeps its shape", "[cli]") {
+  const Workplace place;
+  const VolumeMesh block = lattice(3, 3, 3);
+  HighOrderMesh mesh(ElementSpace(block, Basis::legendre, 2), block);
+  for (std::size_t v = 0; v < block.num_vertices(); ++v)
+    if (!mesh.space.topology().is_boundary_vertex(static_cast<Index>(v)))
+      mesh.coefficients[v] += Vec3(1.2, -0.9, 0.8) * (v % 2 == 0 ? 1 : -1);
+  write_volume(place / "tangled.msh", mesh);
+  CHECK(place.run("check tangled.msh").status == 1);
+  const Run run = place.run("optimize tangled.msh -o valid.msh -o valid.vtu --report valid.json");
+  INFO(run.err);
+  CHECK(run.status == 0);
+  const nlohmann::json report = place.json("valid.json");
+  CHECK(report["valid"] == true);
+  CHECK(report["input"]["quality"]["inverted_cells"] > 0);
+  CHECK(report["quality"]["min_scaled_jacobian"] > 0.9);
+  CHECK(report["volume"].get<double>() == Approx(27).epsilon(1e-12));
+  CHECK(place.run("check valid.msh").status == 0);
+
+  // Options and files that do not go with it.
+  for (const char* option : {"--sizes uniform", "--tolerance 1", "--lambda 1"}) {
+    const Run refused = place.run("optimize tangled.msh -o x.vtu " + std::string(option));
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.err, Contains("not for curved cells"));
+  }
+  CHECK(place.run("optimize tangled.msh -o x.usda").status == 2);
+}
+
+TEST_CASE("fit and optimize: curved cells of other programs are the start of a fit", "[cli][slow]") {
+  const Workplace place;
+  const std::string fit = "fit target.off --max-iterations 5 ";
+  place.run(fit + "--template template.mesh --order 2 -o curved.msh --report first.json");
+  const Run higher = place.run(fit + "--template curved.msh --order 3 -o higher.vtu --report higher.json");
+  INFO(higher.err);
+  CHECK(place.json("higher.json")["orders"]["max"] == 3);
+  CHECK(place.json("higher.json")["valid"] == true);
+  const Run again = place.run("optimize curved.msh --target target.off -o again.vtu --report again.json");
+  INFO(again.err);
+  const nlohmann::json report = place.json("again.json");
+  CHECK(report["command"] == "optimize");
+  CHECK(report["orders"]["max"] == 2);
+  const double before = place.json("first.json")["distance"]["mean_percent"];
+  CHECK(report["distance"]["mean_percent"].get<double>() < 1.05 * before);
+  CHECK(place.run("optimize curved.msh --target target.off --sizes uniform -o x.vtu").status == 2);
+  CHECK_THAT(place.run("fit target.off --template curved.msh -o x.mesh").err, Contains("fit --order"));
 }

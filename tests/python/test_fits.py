@@ -211,6 +211,18 @@ class States(InFolder):
             subvol.fit(*BALL, levels=2, checkpoint="ball.checkpoint", progress=fails)
         self.assertGreater(subvol.fit(*BALL, levels=2, resume="ball.checkpoint").report["recalled_stages"], 0)
 
+    def test_curved_cells_are_optimised(self):
+        curved = subvol.fit(*BALL, order=2, max_iterations=3).mesh
+        alone = subvol.optimize(curved)
+        self.assertTrue(alone.report["valid"])
+        self.assertEqual(alone.mesh.coefficients.shape, curved.coefficients.shape)
+        drawn = subvol.optimize(curved, target=BALL[0], order=3, max_iterations=3)
+        self.assertEqual(drawn.report["orders"]["max"], 3)
+        subvol.write("curved.msh", curved)
+        self.assertTrue(subvol.optimize("curved.msh", target=BALL[0], max_iterations=1).report["valid"])
+        with self.assertRaisesRegex(subvol.InputError, "keeps its shape"):
+            subvol.optimize(curved, tolerance=1.0)
+
     def test_an_optimisation_goes_on(self):
         options = dict(target=BALL[0], order=2, max_iterations=5)
         whole = subvol.optimize(BALL[1], **options, checkpoint="curve.checkpoint")

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/element_rule.h"
-#include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/energies/volume_energy.h"
 #include "subvol/fit/quality/quality.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/sample_meshes.h"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
@@ -95,6 +96,65 @@ TEST_CASE("gradient and Hessian of curved cells agree with differences for every
         for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
         check_derivatives(energy, bent(space, mesh, source, 0.05 / (order * order)), d);
       }
+}
+
+TEST_CASE("the regularised barrier of curved cells is finite if they are inverted, with the derivatives of its value",
+          "[elements]") {
+  PointSource source(7);
+  for (CellKind kind : kAllKinds)
+    for (Basis basis : kBothBases) {
+      const VolumeMesh mesh = single_cell(kind);
+      const ElementSpace space(mesh, basis, 3);
+      HighOrderEnergy energy(space, std::vector{Vec3(1.1, 0.9, 1.05)}, points_of(space, 5));
+      std::vector<Vec3> x = bent(space, mesh, source, 0.05), d(space.num_nodes());
+      x[0] += 3 * (x[1] - x[0]);
+      for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
+      CHECK(std::isinf(energy.value(x)));
+      energy.set_regularisation(0.1);
+      const double value = energy.value(x);
+      REQUIRE(std::isfinite(value));
+      CHECK(energy.uncertified(x).empty());
+      CHECK(energy.not_certified(x).size() == 1);
+      CHECK(energy.max_step(x, d) == 1);
+      std::vector<double> least(1);
+      energy.least_determinants(x, least);
+      CHECK(least[0] < 0);
+
+      constexpr double h = 1e-6;
+      std::vector<Vec3> gradient(x.size(), Vec3::Zero()), again = gradient, product = gradient;
+      CHECK(energy.add_gradient(x, 1, gradient) == Approx(value));
+      CHECK(energy.linearize(x, 1, again) == Approx(value));
+      energy.multiply(d, product);
+      double slope = 0, curvature = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        CHECK((gradient[i] - again[i]).norm() < 1e-12 * (1 + gradient[i].norm()));
+        slope += gradient[i].dot(d[i]);
+        curvature += product[i].dot(d[i]);
+      }
+      CHECK(slope ==
+            Approx((energy.value(moved_along(x, d, h)) - energy.value(moved_along(x, d, -h))) / (2 * h)).epsilon(1e-5));
+      CHECK(curvature > 0);
+      energy.set_regularisation(0);
+      CHECK(std::isinf(energy.value(x)));
+    }
+}
+
+TEST_CASE("cells of curved meshes weigh as they are told to", "[elements]") {
+  const VolumeMesh mesh = lattice(2, 1, 1);
+  const ElementSpace space(mesh, Basis::legendre, 2);
+  HighOrderEnergy energy(space, std::vector(2, Vec3(1, 1, 1)), points_of(space, 5));
+  HighOrderMesh curved(space, mesh);
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    if (curved.coefficients[v].x() == 2) curved.coefficients[v].x() = 3;  // the second cell is twice as long
+  const double alone = 2 * energy.value(curved.coefficients);
+  CHECK(alone == Approx(0.5 * std::log(2) * std::log(2)));
+  energy.set_weights(std::vector{1.0, 3.0});
+  CHECK(energy.value(curved.coefficients) == Approx(0.75 * alone));
+  energy.densify(std::vector<Index>{0}, curved.coefficients);
+  CHECK(energy.value(curved.coefficients) == Approx(0.75 * alone));
+  CHECK_THROWS_AS(energy.set_weights(std::vector{1.0}), InputError);
+  CHECK_THROWS_AS(energy.set_weights(std::vector{1.0, 0.0}), InputError);
+  CHECK_THROWS_AS(energy.set_regularisation(-1), InputError);
 }
 
 TEST_CASE("gradient and Hessian of a mesh of all kinds and mixed orders agree with differences", "[elements]") {

@@ -141,3 +141,45 @@ TEST_CASE("A regularised volume energy does not depend on place, orientation or 
   CHECK(std::isinf(energy.value(mesh.positions)));
   CHECK_FALSE(energy.uncertified(mesh.positions).empty());
 }
+
+TEST_CASE("In the form of other distortions, the regularised barrier has the same second derivative") {
+  std::mt19937 random(6);
+  for (int trial = 0; trial < 60; ++trial) {
+    Mat3 j = random_matrix(random);
+    if (trial % 4 == 1) j.col(2) = j.col(0) + j.col(1);  // flat
+    if (trial % 4 == 2) j.col(1) = j.col(2) = 2 * j.col(0);
+    if (trial % 8 == 3) j.setZero();
+    const Mat3 d = random_matrix(random);
+    const double epsilon = std::pow(10.0, -trial % 4);
+    const Value value = barrier(j, epsilon);
+    DistortionBatch batch;
+    for (int k = 0; k < 9; ++k)
+      for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = j(k / 3, k % 3);
+    regularised_hessian(&batch, 1, epsilon);
+    const auto matrix_of = [&](const double(*entries)[kLanes]) {
+      Mat3 m;
+      for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = entries[k][3];
+      return m;
+    };
+    CHECK(batch.energy[3] == value.energy);
+    CHECK(matrix_of(batch.stress) == value.stress);
+    const Mat3 u = matrix_of(batch.u), v = matrix_of(batch.v), w = u.transpose() * d * v;
+    CHECK((u.transpose() * u - Mat3::Identity()).norm() < 1e-10);
+    CHECK((v.transpose() * v - Mat3::Identity()).norm() < 1e-10);
+    Mat3 p;
+    for (int i = 0; i < 3; ++i) {
+      const int k = (i + 1) % 3, other = (i + 2) % 3;
+      p(i, i) =
+          batch.stretch[i][3] * w(i, i) + batch.coupling[i][3] * w(k, k) + batch.coupling[other][3] * w(other, other);
+      p(i, k) = batch.pair_same[i][3] * w(i, k) + batch.pair_cross[i][3] * w(k, i);
+      p(k, i) = batch.pair_same[i][3] * w(k, i) + batch.pair_cross[i][3] * w(i, k);
+    }
+    const Mat3 found = u * p * v.transpose();
+    const Mat3 wanted =
+        value.alpha * d +
+        value.beta * (j * value.cofactor.cwiseProduct(d).sum() + value.cofactor * j.cwiseProduct(d).sum()) +
+        value.gamma * value.cofactor * value.cofactor.cwiseProduct(d).sum();
+    INFO("trial " << trial << ", determinant " << j.determinant() << ", epsilon " << epsilon);
+    CHECK((found - wanted).norm() < 1e-9 * (wanted.norm() + value.alpha * d.norm()));
+  }
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/verbs/optimize_curved_run.h"
+
+#include "cli/runs/check_report.h"
+#include "cli/runs/checkpointing.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/interrupt.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/report.h"
+#include "cli/runs/written_result.h"
+#include "cli/verbs/verb_options.h"
+#include "subvol/base/error.h"
+#include "subvol/base/version.h"
+#include "subvol/fit/quality/high_order_quality.h"
+
+#include <algorithm>
+#include <iostream>
+#include <utility>
+
+namespace subvol::cli {
+
+using namespace internal;
+
+CurvedOptimizeRun::CurvedOptimizeRun(const OptimizeArguments& arguments, const LongRun& begun, HighOrderFile file)
+    : LongRun(begun), arguments_(arguments), file_(std::move(file)), input_(describe(arguments.mesh, file_.mesh)) {
+  for (const char* option : {"--sizes", "--crease-angle", "--tolerance", "--max-tolerance", "--lambda"})
+    if (verb_.count(option) > 0)
+      throw UsageError(std::string(option) + ": not for curved cells without --target, whose boundary keeps its shape");
+  for (const Output& output : outputs_) require_for_curved_cells(output);
+  require_regions(outputs_, regions_of(labels_of(file_)));
+}
+
+void CurvedOptimizeRun::optimize() {
+  before_ = measure_quality(file_.mesh);
+  const OptimizeOptions& asked = arguments_.optimize;
+  CurvedOptimizeOptions options{.fixed_boundary = asked.fixed_boundary,
+                                .quality = asked.quality,
+                                .max_iterations = asked.max_iterations,
+                                .time_limit_seconds = asked.time_limit_seconds};
+  const VolumeMesh labels = labels_of(file_);
+  Checkpointing checkpointing(run_, run_identity(verb_, {{"mesh", fingerprint(labels)}}));
+  options.log = checkpointing.log();
+  CurvedOptimizeResult result = followed([&](auto progress) {
+    options.progress = progress;
+    options.cancelled = interrupted;
+    return optimize_curved(file_.mesh, labels, options);
+  });
+  checkpointing.finish(result.report.warnings);
+  add_warnings(result.report.warnings);
+  file_.mesh = std::move(result.mesh);
+  fit_ = std::move(result.report);
+}
+
+void CurvedOptimizeRun::write() {
+  WritingOptions writing = arguments_.writing;
+  writing.source = arguments_.mesh;
+  writing.options = options_of_result(verb_);
+  write_each([&](const Output& output) { write_output(output, file_, writing); });
+}
+
+void CurvedOptimizeRun::check() {
+  const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
+  const HighOrderMesh& mesh = written ? *written : file_.mesh;
+  const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(arguments_.writing));
+  mesh_check_ = watched([&](auto progress) {
+    return check_mesh(mesh, boundary, static_cast<const TriangleMesh*>(nullptr),
+                      {.labels = {file_.references, file_.regions}, .progress = progress});
+  });
+  add_warnings(warnings_of_quality(arguments_.optimize.quality, mesh_check_));
+}
+
+Json CurvedOptimizeRun::report() const {
+  Json json{{"subvol", version()},
+            {"command", "optimize"},
+            {"options", options_in_force(verb_)},
+            {"input", {{"mesh", input_}, {"quality", quality_json(before_)}}},
+            {"mesh", describe("", file_.mesh)}};
+  json.update(fit_json(fit_));
+  json.update(check_json(mesh_check_));
+  json["not_certified_cells"] = not_certified_cells(mesh_check_);
+  return json;
+}
+
+void CurvedOptimizeRun::summarise() const {
+  std::cerr << to_string(fit_.stop_reason) << ": " << fit_.explanation << '\n'
+            << "before: " << before_.certificate.not_certified.size() << " cells not certified, scaled Jacobian min "
+            << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
+            << to_text(mesh_check_);
+  tell_outputs();
+}
+
+int CurvedOptimizeRun::run() {
+  tell_warnings();
+  timed("optimize", &CurvedOptimizeRun::optimize);
+  timed("write", &CurvedOptimizeRun::write);
+  timed("check", &CurvedOptimizeRun::check);
+  write_report(report());
+  if (!arguments_.run.quiet) summarise();
+  require_outputs();
+  return status(fit_, mesh_check_.valid());
+}
+
+}  // namespace subvol::cli
