@@ -38,14 +38,17 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
       attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
   } else {
     std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+    counts.push_back(kMostAutomaticCells);
     if (options.cells) counts = {*options.cells};
-    for (const std::size_t cells : counts)
-      if (cells >= kChildren * kLeastTemplateCells)
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const bool has_unrefined = i + 2 >= counts.size();  // the last two
+      if (counts[i] >= kChildren * kLeastTemplateCells)
         attempts.push_back({.kind = Kind::smooth,
-                            .template_cells = cells / kChildren,
+                            .template_cells = counts[i] / kChildren,
                             .levels = 1,
-                            .precedes_unrefined = cells == counts.back()});
-    attempts.push_back({Kind::smooth, counts.back(), 0});
+                            .precedes_unrefined = has_unrefined});
+      if (has_unrefined) attempts.push_back({Kind::smooth, counts[i], 0});
+    }
   }
   return attempts;
 }

@@ -222,7 +222,8 @@ bool AutomaticDriver::polish() {
   // moves more cells.
   constexpr double kMostPoor = 0.1, kMostPoorOfCage = 0.05;
   constexpr int kPointsPerDirection = 3;
-  if (!is_good() || result_.chosen + 1 != result_.trials.size()) return true;
+  if (!is_good() || !is_present_best() || last_polished_ == result_.chosen) return true;
+  last_polished_ = result_.chosen;
   AutomaticFitTrial trial = best();
   trial.is_polished = true;
   const double tolerance = options_.max_tolerance_percent;
@@ -241,7 +242,9 @@ bool AutomaticDriver::polish() {
   if (!is_lifted) return going;
   // The share of the quality that is reached is the one of the quality aimed at.
   going = going && fit_level(trial.level, {{}, {}, options_.quality}, ", polished");
-  return judge(std::move(trial)) && going;
+  going = judge(std::move(trial)) && going;
+  if (is_present_best()) last_polished_ = result_.chosen;
+  return going;
 }
 
 bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,

@@ -50,6 +50,14 @@ class AutomaticDriver {
   /// Returns true if no other template needs to be tried.
   bool is_good() const { return !result_.trials.empty() && is_good_enough(best()); }
 
+  /// Returns true if the present mesh is that of the best trial.
+  bool is_present_best() const { return taken_best_ == result_.chosen || result_.chosen + 1 == result_.trials.size(); }
+  /// To be called if the present mesh was made that of the best trial: takes its states as well.
+  void take_states() {
+    states_ = result_.states;
+    taken_best_ = result_.chosen;
+  }
+
   void begin_attempt() { share_at_end_ += kAttemptPortion * (1 - share_at_end_); }
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
@@ -124,6 +132,8 @@ class AutomaticDriver {
   bool is_relaxing_ = false;        ///< `relax_hopeless_cells` precedes the stages
   std::optional<Vec3> relaxed_at_;  ///< its first place, in the target's coordinates
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept
+  std::optional<std::size_t> taken_best_;     ///< number of the trial at `take_states`
+  std::optional<std::size_t> last_polished_;  ///< number of the trial that was polished, or is the result of that
   double share_at_end_ = 0;       ///< of the attempt in progress
 };
 

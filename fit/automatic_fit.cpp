@@ -120,6 +120,13 @@ class AutomaticFit : AutomaticDriver {
     constexpr double kMany = 0.4;
     return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
+  /// More cells are tried on a surface without edges as long as an aim is missed at all: they cost little there.
+  bool is_strict() const { return !follows_.any() && !options_.makes_cage; }
+  bool ends_search() const {
+    constexpr double kNearlyAll = 0.95;  // of the quality: what is left is worth no more cells
+    return is_good() && (!is_strict() || (meets_distances(best(), options_) && best().least_share >= kNearlyAll));
+  }
+  void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
   bool is_worth_refining() const {
     return !options_.makes_cage && !is_good() &&
@@ -533,14 +540,25 @@ bool AutomaticFit::run_attempt(const AutomaticAttempt& attempt) {
   return going;
 }
 
+/// Makes the best trial the present one, to go on from, if it is another one and follows no edges.
+void AutomaticFit::take_best() {
+  if (is_present_best() || !is_strict() || best_start_.kind != AutomaticAttempt::Kind::smooth) return;
+  layout_.reset();
+  mesh_ = result_.mesh;
+  sizes_ = best_start_.grid.sizes;
+  start_ = best_start_;
+  take_states();
+}
+
 AutomaticFitResult AutomaticFit::run() {
   find_edges();
   find_features();
   const std::vector<AutomaticAttempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
-  for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
+  for (std::size_t i = 0; i < attempts.size() && going && !ends_search(); ++i) {
     begin_attempt();
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
+    if (going && is_strict() && is_good() && meets_distances(best(), options_)) going = polish();
     if (going && result_.trials.empty() && diagnosis_ &&
         is_too_thin_for_grids(*diagnosis_, attempts.back().template_cells))
       throw InputError(refusal_);
@@ -567,7 +585,10 @@ AutomaticFitResult AutomaticFit::run() {
     going =
         run_attempt({AutomaticAttempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
-  if (going) going = polish();
+  if (going) {
+    take_best();
+    going = polish();
+  }
   if (going) conclude_fit(result_, options_);
   return finish();
 }

@@ -43,6 +43,9 @@ inline constexpr double kFarOffVolumeFactor = 10;
 /// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
 inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 30000};
+/// Number that is tried at last on surfaces without sharp edges, if these were not enough for all aims: more cost more
+/// than a minute.
+inline constexpr std::size_t kMostAutomaticCells = 100000;
 
 struct AutomaticFitOptions {
   /// Number of cells that the result may have, at least kLeastTemplateCells; more only if no smaller template has the
@@ -134,7 +137,7 @@ struct AutomaticFitResult {
 /// 80 % of the edges' length finds a path is skipped if a larger one follows.
 ///
 /// The best trial is kept; no other is made once the merit is below 0.15, not counting a share of the quality of 85 %
-/// or more:
+/// or more, or, if there are no edges to follow, once it meets the distances and 95 % of the quality:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
@@ -160,7 +163,7 @@ struct AutomaticFitResult {
 ///
 /// The good trial is polished: it is lifted by steps of 0.05 beyond the quality aimed at, up to 0.8, as long as they
 /// are reached while the largest distance grows by a fifth at most. The result is another trial; if it is good, too,
-/// the one with the higher least scaled Jacobian is kept.
+/// the one with the higher least scaled Jacobian is kept, unless only the other one meets the distances.
 ///
 /// With `makes_cage`, the mesh that comes before the last subdivision, or the padded mesh, is fitted by the schedule of
 /// meshes that are refined. Then it is the cage (`FittedCage`): its vertices are the unknowns of all that follows, and

@@ -72,6 +72,10 @@ bool is_valid(const AutomaticFitTrial& trial) {
   return trial.uncertified == 0 && trial.self_intersections == std::size_t{0};
 }
 
+bool meets_distances(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
+  return trial.max_percent <= options.max_tolerance_percent && trial.mean_percent <= options.mean_tolerance_percent;
+}
+
 bool is_good_enough(const AutomaticFitTrial& trial) {
   const double excused = trial.least_share >= kEnoughQuality ? kQualityWeight * (1 - trial.least_share) : 0;
   return trial.merit - excused < kGoodMerit;
@@ -82,9 +86,11 @@ namespace {
 bool is_long(const MissedEdge& edge) { return edge.length_percent > kLongEdgePercent; }
 
 /// Returns true if a trial is better than the best one before. If it is that one polished and still good, the quality
-/// decides.
-bool is_better(const AutomaticFitTrial& trial, const AutomaticFitTrial& best) {
-  if (trial.is_polished && is_good_enough(trial)) return trial.least_scaled_jacobian > best.least_scaled_jacobian;
+/// decides, unless it no longer meets the distances.
+bool is_better(const AutomaticFitTrial& trial, const AutomaticFitTrial& best, const AutomaticFitOptions& options) {
+  if (trial.is_polished && is_good_enough(trial) &&
+      (meets_distances(trial, options) || !meets_distances(best, options)))
+    return trial.least_scaled_jacobian > best.least_scaled_jacobian;
   return trial.merit < best.merit;
 }
 
@@ -104,7 +110,7 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
   }
   trial.merit = merit_of(trial, options);
   result.trials.push_back(trial);
-  if (result.trials.size() > 1 && !is_better(trial, result.trials[result.chosen])) return false;
+  if (result.trials.size() > 1 && !is_better(trial, result.trials[result.chosen], options)) return false;
   result.chosen = result.trials.size() - 1;
   result.mesh = mesh;
   result.report.creases = edges;

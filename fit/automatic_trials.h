@@ -44,8 +44,11 @@ double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& opti
 /// Returns true if all cells are certified and the boundary is found not to meet itself.
 bool is_valid(const AutomaticFitTrial& trial);
 
-/// Returns true if no other template needs to be tried.
+/// Returns true if no other template needs to be tried, or if it was the last one, no smaller cells.
 bool is_good_enough(const AutomaticFitTrial& trial);
+
+/// Returns true if both distances are within those allowed.
+bool meets_distances(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);
 
 /// Completes a trial by what was measured of its mesh, and adds it to a result. Returns true if it is the best one so
 /// far; the result then holds the mesh and its edges. trial  with its distances, self-intersections and least share of

@@ -219,12 +219,24 @@ TEST_CASE("A trial that loses a feature is never good enough") {
   CHECK(is_good({.share = 1.1, .size_percent = 0.1}));  // noise of a triangulation
 }
 
-TEST_CASE("Templates are tried from small ones on, and at last one that is not refined") {
+TEST_CASE("Templates are tried from small ones on, and at last ones that are not refined") {
   std::vector<std::size_t> most;
-  for (const internal::AutomaticAttempt& attempt : internal::attempts_of({}, false))
+  std::vector<int> levels;
+  for (const internal::AutomaticAttempt& attempt : internal::attempts_of({}, false)) {
     most.push_back(internal::cells_after(attempt.template_cells, attempt.levels));
-  CHECK(most == std::vector<std::size_t>{5000, 15000, 40000, 40000});
-  CHECK(internal::attempts_of({}, false).back().levels == 0);
+    levels.push_back(attempt.levels);
+  }
+  CHECK(most == std::vector<std::size_t>{5000, 15000, 40000, 40000, 100000, 100000});
+  CHECK(levels == std::vector<int>{1, 1, 1, 0, 1, 0});
+  CHECK(internal::attempts_of({.cells = 20000}, false).size() == 2);
+}
+
+TEST_CASE("A trial meets the distances if neither is larger than allowed") {
+  const AutomaticFitOptions options;
+  const double mean = options.mean_tolerance_percent, max = options.max_tolerance_percent;
+  CHECK(internal::meets_distances({.mean_percent = mean, .max_percent = max}, options));
+  CHECK_FALSE(internal::meets_distances({.mean_percent = 1.01 * mean, .max_percent = max}, options));
+  CHECK_FALSE(internal::meets_distances({.mean_percent = mean, .max_percent = 1.01 * max}, options));
 }
 
 TEST_CASE("An automatic fit refuses options out of range") {
