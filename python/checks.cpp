@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
+#include "cli/runs/face_groups.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/module.h"
@@ -50,6 +51,12 @@ py::dict check(const py::object& object, const py::object& target_object, const 
     return std::visit([&](const auto& geometry) { return check_against(&geometry); }, *target);
   });
   py::dict report = to_python(cli::check_json(found));
+  if (target && found.quality) {
+    const cli::GroupsFound groups = work.run("groups", [&] {
+      return mesh.linear ? cli::compare_groups(*target, *mesh.linear) : cli::compare_groups(*target, *mesh.curved);
+    });
+    if (!groups.groups.empty()) report["groups"] = to_python(cli::groups_json(groups.groups));
+  }
   if (mesh.lagrange) {
     report["valid"] = found.valid() && mesh.lagrange->valid();
     report["lagrange_cells"] = to_python(cli::lagrange_json(*mesh.lagrange));

@@ -27,7 +27,42 @@ GroupsFound carry(const TriangleMesh& target, const CurvedBoundary& boundary, co
   return found;
 }
 
+/// The place of a group among others, or kNoIndex.
+Index place_of(const Group& group, const std::vector<Group>& others) {
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const bool have_names = !group.name.empty() && !others[i].name.empty();
+    if (have_names ? group.name == others[i].name : group.number == others[i].number) return static_cast<Index>(i);
+  }
+  return kNoIndex;
+}
+
+GroupsFound compare(const TriangleMesh& target, const CurvedBoundary& boundary, const MeshTopology& topology,
+                    const VolumeFaceGroups& own) {
+  std::vector<Index> places;
+  for (const Group& group : own.groups) places.push_back(place_of(group, target.face_groups.groups));
+  std::vector<Index> found = groups_of_boundary(own, topology);
+  for (Index& group : found)
+    if (group != kNoIndex) group = places[static_cast<std::size_t>(group)];
+  GroupsFound result{areas_of_groups(target, boundary, found), {}};
+  for (const std::string& warning : warnings_of_groups(result.groups)) result.warnings.push_back(as_utf8(warning));
+  return result;
+}
+
 }  // namespace
+
+GroupsFound compare_groups(const Target& target, const VolumeMesh& mesh) {
+  const TriangleMesh* surface = grouped_surface(target);
+  if (!surface || mesh.face_groups.empty() || mesh.num_cells() == 0) return {};
+  const MeshTopology topology(mesh);
+  return compare(*surface, linear_boundary(mesh, topology), topology, mesh.face_groups);
+}
+
+GroupsFound compare_groups(const Target& target, const HighOrderFile& file) {
+  const TriangleMesh* surface = grouped_surface(target);
+  if (!surface || file.face_groups.empty()) return {};
+  return compare(*surface, curved_boundary(file.mesh, WritingOptions{}.chord_percent), file.mesh.space.topology(),
+                 file.face_groups);
+}
 
 GroupsFound carry_groups(const Target& target, VolumeMesh& mesh) {
   const TriangleMesh* surface = grouped_surface(target);

@@ -26,6 +26,11 @@ struct GroupsFound {
 GroupsFound carry_groups(const Target& target, VolumeMesh& mesh);
 GroupsFound carry_groups(const Target& target, HighOrderFile& file);
 
+/// Compare the groups that a mesh has on its boundary with those of a target: a group of the same name or, if one of
+/// the two has none, of the same number. Empty if the mesh or the target has no groups.
+GroupsFound compare_groups(const Target& target, const VolumeMesh& mesh);
+GroupsFound compare_groups(const Target& target, const HighOrderFile& file);
+
 /// Entry "groups" of a report.
 Json groups_json(const std::vector<CarriedGroup>& groups);
 

@@ -2,6 +2,7 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/outputs.h"
@@ -36,6 +37,7 @@ struct Checked {
   Json input;                             ///< description of the mesh
   std::optional<SubdivisionAudit> audit;  ///< for a mesh that may be subdivided
   std::optional<LagrangeCheck> lagrange;  ///< for the cells beside an exact map
+  GroupsFound groups{};                   ///< of the mesh beside those of the target
 
   bool valid() const { return check.valid() && (!lagrange || lagrange->valid()); }
 };
@@ -52,6 +54,7 @@ Checked check_linear(const CheckArguments& arguments, const VolumeMesh& mesh, co
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
+  if (target && checked.check.quality) checked.groups = compare_groups(*target, mesh);
   return checked;
 }
 
@@ -64,6 +67,7 @@ Checked check_high_order(const CheckArguments& arguments, const HighOrderFile& f
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   if (arguments.region.empty() && holds_exact_map(arguments.mesh))
     checked.lagrange = check_lagrange_cells(arguments.mesh, mesh);
+  if (target) checked.groups = compare_groups(*target, file);
   return checked;
 }
 
@@ -79,6 +83,7 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
   json["valid"] = checked.valid();
   if (checked.lagrange) json["lagrange_cells"] = lagrange_json(*checked.lagrange);
   if (checked.audit) json["audit"] = audit_json(*checked.audit);
+  if (!checked.groups.groups.empty()) json["groups"] = groups_json(checked.groups.groups);
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = internal::peak_memory_bytes();
   return json;
@@ -158,6 +163,7 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   const Checked checked = curved ? check_high_order(arguments, *curved, target, teller.work())
                                  : check_linear(arguments, std::get<VolumeMesh>(mesh), target, teller.work());
   teller.finish();
+  warnings.insert(warnings.end(), checked.groups.warnings.begin(), checked.groups.warnings.end());
   tell_check(arguments, warnings, report_json(arguments, verb, checked, warnings), text_of(checked));
   return checked.valid() ? kDone : kFailed;
 }

@@ -3,9 +3,12 @@
 
 #include "samples/shapes.h"
 #include "subvol/export/high_order_file.h"
+#include "subvol/export/obj_writer.h"
+#include "subvol/export/volume_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 #include "tests/support/grouped_meshes.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
@@ -112,6 +115,46 @@ TEST_CASE("An automatic fit carries the groups of its target", "[cli][slow]") {
   REQUIRE((fit.status == 0 || fit.status == 4));
   check_halves(read_volume_mesh(place / "a.mesh"));
   CHECK(place.json("a.json")["groups"].size() == 2);
+}
+
+TEST_CASE("check: the groups of a mesh are compared with those of the target, by name or number", "[cli]") {
+  const Workplace place;
+  VolumeMesh block = subvol::test::lattice(2, 2, 2);
+  const MeshTopology topology(block);
+  PolygonMesh surface = boundary_surface(block, topology);
+  surface.face_groups.groups = {{"low", 1, 2}, {"high", 2, 2}, {"lost", 3, 2}};
+  block.face_groups.groups = {{"low", 7, 2}, {"high", 9, 2}};
+  for (std::size_t i = 0; i < topology.boundary_faces().size(); ++i) {
+    const std::span<const Index> face = topology.face(topology.boundary_faces()[i]);
+    const auto on = [&](int axis, double value) {
+      return std::ranges::all_of(face, [&](Index v) { return block.positions[v][axis] == value; });
+    };
+    surface.face_groups.of_face.push_back(on(2, 0) ? 0 : on(2, 2) ? 1 : on(0, 0) ? 2 : kNoIndex);
+    if (on(2, 0)) block.face_groups.faces.push_back({face_key(face), 0});
+    const bool on_left = std::ranges::all_of(face, [&](Index v) { return block.positions[v].x() <= 1; });
+    if (on(2, 2) && on_left) block.face_groups.faces.push_back({face_key(face), 1});
+  }
+  normalise(block.face_groups);
+  write_obj(place / "target.obj", surface);
+  write_volume(place / "mesh.msh", block);
+  const Run run = place.run("check mesh.msh --target target.obj --report check.json");
+  INFO(run.err);
+  CHECK(run.status == 0);
+  const nlohmann::json groups = place.json("check.json")["groups"];
+  REQUIRE(groups.size() == 3);
+  for (const nlohmann::json& group : groups) {
+    const std::string name = group["name"];
+    CHECK(group["target_area"].get<double>() == Approx(4));
+    CHECK(group["area"].get<double>() == Approx(name == "low" ? 4 : name == "high" ? 2 : 0));
+  }
+  CHECK(has(run.err, "lost"));
+
+  block.face_groups.groups = {{"", 7, 2}, {"", 9, 2}};
+  write_volume(place / "numbers.msh", block);
+  const Run same = place.run("check numbers.msh --target mesh.msh --report numbers.json");
+  INFO(same.err);
+  for (const nlohmann::json& group : place.json("numbers.json")["groups"])
+    CHECK(group["area"].get<double>() == Approx(group["target_area"].get<double>()));
 }
 
 TEST_CASE("Without groups, results are as before, and groups that no output holds are told", "[cli]") {
