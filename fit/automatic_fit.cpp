@@ -120,6 +120,8 @@ class AutomaticFit : AutomaticDriver {
     constexpr double kMany = 0.4;
     return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
+  /// Number of cells up to which a fit is refined, if the number is free.
+  static double most_refined_cells() { return kMostGrowth * static_cast<double>(kAutomaticCells.back()); }
   /// More cells are tried on a surface without edges as long as an aim is missed at all: they cost little there.
   bool is_strict() const { return !follows_.any() && !options_.makes_cage; }
   bool ends_search() const {
@@ -128,8 +130,10 @@ class AutomaticFit : AutomaticDriver {
   }
   void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
+  /// Nor are larger meshes, if the number of cells is free: it takes minutes and gains little.
   bool is_worth_refining() const {
-    return !options_.makes_cage && !is_good() &&
+    const bool has_room = options_.cells || static_cast<double>(best().cells) <= most_refined_cells();
+    return !options_.makes_cage && !is_good() && has_room &&
            (best_start_.kind == AutomaticAttempt::Kind::smooth || best().merit > kWorthRefining);
   }
 
@@ -476,7 +480,7 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
 /// and at cells that meet or are poor. Returns false if the fit must end.
 bool AutomaticFit::run_graded() {
   constexpr double kShareOfGrid = 0.6;  // of the cells allowed; the others are left for the small ones
-  const std::size_t most = options_.cells.value_or(static_cast<std::size_t>(kMostGrowth * kAutomaticCells.back()));
+  const std::size_t most = options_.cells.value_or(static_cast<std::size_t>(most_refined_cells()));
   if (!finest_ || static_cast<double>(finest_->mesh.num_cells()) > kMostShareOfGrid * static_cast<double>(most)) {
     const auto cells = static_cast<std::size_t>(kShareOfGrid * static_cast<double>(most));
     finest_ = make_template({.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells), .pillow = true});
