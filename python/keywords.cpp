@@ -4,9 +4,28 @@
 #include "subvol/base/error.h"
 
 #include <algorithm>
+#include <cctype>
 #include <limits>
 
 namespace subvol::python {
+
+std::string in_keywords(const std::string& message) {
+  const auto is_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-'; };
+  std::string result;
+  for (std::size_t i = 0; i < message.size();) {
+    const bool begins = message.compare(i, 2, "--") == 0 && i + 2 < message.size() &&
+                        std::islower(static_cast<unsigned char>(message[i + 2])) != 0 &&
+                        (i == 0 || !is_of_word(message[i - 1]));
+    if (!begins) {
+      result += message[i++];
+      continue;
+    }
+    std::string name;
+    for (i += 2; i < message.size() && is_of_word(message[i]); ++i) name += message[i] == '-' ? '_' : message[i];
+    result += name == "lambda" ? "lambda_" : name;  // a word of Python
+  }
+  return result;
+}
 
 std::optional<bool> truth_of(const py::object& object) {
   const bool is_truth =

@@ -24,6 +24,9 @@ using Choices = std::vector<std::pair<const char*, Value>>;
 /// Converts True or False of Python or NumPy; nothing for other objects.
 std::optional<bool> truth_of(const py::object& object);
 
+/// Returns a message of the library with options of the command line named as keywords: "--time-limit" as "time_limit".
+std::string in_keywords(const std::string& message);
+
 /// Keyword arguments of one call, taken one by one under the names of the command line (with "_" for "-").
 ///
 /// The library checks the values; only their types are checked here. None stands for the default.

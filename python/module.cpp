@@ -27,7 +27,7 @@ PyObject* new_error(py::module_& module, const char* name, const char* help, std
 }
 
 // File names need not be UTF-8.
-void set_error(PyObject* error, const char* text) { PyErr_SetString(error, cli::as_utf8(text).c_str()); }
+void set_error(PyObject* error, const char* text) { PyErr_SetString(error, cli::as_utf8(in_keywords(text)).c_str()); }
 
 void add_errors(py::module_& module) {
   errors.any = new_error(module, "Error", "What subvol raises, but for TypeError and what Python itself raises.",

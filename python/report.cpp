@@ -53,7 +53,9 @@ py::dict make_report(const char* command, const Json& found, const Keywords& key
   report["command"] = command;
   report["options"] = keywords.in_force();
   for (const auto& [key, value] : found.items()) report[py::str(key)] = to_python(value);
-  report["warnings"] = to_python(warnings);
+  py::list told;
+  for (const std::string& warning : warnings) told.append(cli::as_utf8(in_keywords(warning)));
+  report["warnings"] = told;
   py::dict seconds;
   for (const auto& [part, value] : work.seconds_by_part()) seconds[py::str(part)] = value;
   seconds["total"] = work.seconds();

@@ -59,7 +59,7 @@ void Work::raise_pending() {
 
 void warn(const std::vector<std::string>& texts) {
   for (const std::string& text : texts)
-    if (PyErr_WarnEx(PyExc_UserWarning, cli::as_utf8(text).c_str(), 1) != 0) throw py::error_already_set();
+    if (PyErr_WarnEx(PyExc_UserWarning, cli::as_utf8(in_keywords(text)).c_str(), 1) != 0) throw py::error_already_set();
 }
 
 }  // namespace subvol::python

@@ -50,17 +50,28 @@ class NearestWord {
   std::size_t least_ = 3;  // edits: more is another word
 };
 
-/// Refuses an unknown verb: the parser would only say that a verb is missing.
+/// Refuses an unknown verb, of the program or of a group of verbs: the parser would only say that a verb is missing.
 void require_known_verb(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-' || std::string_view(argv[1]) == "help") return;
-  NearestWord nearest(argv[1]);
-  std::string verbs;
-  for (const CLI::App* verb : app.get_subcommands({})) {
-    if (verb->get_name() == argv[1]) return;
-    nearest.consider(verb->get_name());
-    verbs += ' ' + verb->get_name();
+  const CLI::App* group = &app;
+  std::string groups;  // the words before, each with a space
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::vector<const CLI::App*> verbs = group->get_subcommands({});
+    if (verbs.empty() || group->get_require_subcommand_min() == 0 || word.starts_with('-') ||
+        (i == 1 && word == "help"))
+      return;
+    NearestWord nearest(word);
+    const CLI::App* found = nullptr;
+    std::string names;
+    for (const CLI::App* verb : verbs) {
+      if (verb->get_name() == word) found = verb;
+      nearest.consider(verb->get_name());
+      names += ' ' + verb->get_name();
+    }
+    if (!found) throw UsageError("there is no verb '" + groups + word + "'; " + nearest.hint("there are:" + names));
+    group = found;
+    groups += word + ' ';
   }
-  throw UsageError(std::string("there is no verb '") + argv[1] + "'; " + nearest.hint("there are:" + verbs));
 }
 
 /// Refuses an option that neither the verb nor the program has. The parser would first complain about arguments that

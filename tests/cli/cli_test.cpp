@@ -344,6 +344,8 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   refuses("frobnicate", 2, "frobnicate");
   refuses("optimise in.mesh -o out.mesh", 2, "there is no verb 'optimise'; did you mean optimize?");
   refuses("transmogrify", 2, "there is no verb 'transmogrify'; there are: fit");
+  refuses("template splt in.mesh -o out.mesh", 2, "there is no verb 'template splt'; did you mean split?");
+  refuses("template frobnicate", 2, "there are: auto");
   refuses("--helpp", 2, "there is no option '--helpp'; did you mean --help?");
   refuses("fit --helpp", 2, "did you mean --help?");
   refuses("fit target.off --tolerence 1 -o out.glb", 2, "did you mean --tolerance?");

@@ -83,6 +83,12 @@ class Filling(InFolder):
         self.assert_same_file("a.mesh", "b.mesh")
         self.assertIsNone(subvol.fill("ball_target.off", cells=100, max_iterations=1).cage)
 
+    def test_messages_name_keywords(self):
+        curved = subvol.fit("ball_target.off", "ball_template.mesh", order=2, max_iterations=1).mesh
+        subvol.write("curved.msh", curved)
+        with self.assertRaisesRegex(subvol.InputError, "`fit order` read"):
+            subvol.fit("ball_target.off", "curved.msh")
+
     def test_options_out_of_range(self):
         with self.assertRaisesRegex(subvol.InputError, "quality must be in"):
             subvol.fill("ball_target.off", quality=0.95)
