@@ -76,11 +76,12 @@ class AutomaticDriver {
   /// Measures the present mesh, and keeps it if it is the best one.
   virtual bool judge(AutomaticFitTrial trial) = 0;
 
-  /// Returns the schedule of a mesh that is not refined any more, which aims at a largest distance, the one allowed, as
-  /// well.
+  /// Returns the schedule of a mesh that is not refined any more, which aims at a largest distance as well.
   QualitySchedule aiming_at_distance(QualitySchedule schedule) const {
-    return aiming_at(options_.max_tolerance_percent, std::move(schedule));
+    return aiming_at(aimed_max_percent(), std::move(schedule));
   }
+  /// The largest distance to aim at, in per cent of the diagonal: at most the one allowed.
+  virtual double aimed_max_percent() const { return options_.max_tolerance_percent; }
   /// Fits the present mesh, refines it so many times, fitting it each time, and judges it. If a cage is made, the last
   /// mesh is fitted by the vertices of the one before.
   bool fit_and_refine(int levels);
