@@ -2,7 +2,6 @@
 #include "cli/verbs/optimize_curved_run.h"
 
 #include "cli/runs/check_report.h"
-#include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
@@ -38,14 +37,14 @@ void CurvedOptimizeRun::optimize() {
                                 .max_iterations = asked.max_iterations,
                                 .time_limit_seconds = asked.time_limit_seconds};
   const VolumeMesh labels = labels_of(file_);
-  Checkpointing checkpointing(run_, run_identity(verb_, {{"mesh", fingerprint(labels)}}));
-  options.log = checkpointing.log();
+  checkpointing_.emplace(run_, run_identity(verb_, {{"mesh", fingerprint(labels)}}));
+  options.log = checkpointing_->log();
   CurvedOptimizeResult result = followed([&](auto progress) {
     options.progress = progress;
     options.cancelled = interrupted;
     return optimize_curved(file_.mesh, labels, options);
   });
-  checkpointing.finish(result.report.warnings);
+  checkpointing_->finish(result.report.warnings);
   add_warnings(result.report.warnings);
   file_.mesh = std::move(result.mesh);
   fit_ = std::move(result.report);
@@ -77,6 +76,7 @@ Json CurvedOptimizeRun::report() const {
             {"mesh", describe("", file_.mesh)}};
   json.update(fit_json(fit_));
   json.update(check_json(mesh_check_));
+  checkpointing_->describe(json);
   json["not_certified_cells"] = not_certified_cells(mesh_check_);
   return json;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/runs/checkpointing.h"
 #include "cli/verbs/long_run.h"
 #include "cli/verbs/optimize_run.h"
 #include "subvol/export/high_order_file.h"
@@ -33,6 +34,7 @@ class CurvedOptimizeRun : public LongRun {
   HighOrderFile file_;
   Json input_;
   QualityReport before_;
+  std::optional<Checkpointing> checkpointing_;
   FitReport fit_;
   MeshCheck mesh_check_;
 };

@@ -122,6 +122,13 @@ TEST_CASE("optimize: curved cells of other programs are untangled, and their bou
   CHECK(report["volume"].get<double>() == Approx(27).epsilon(1e-12));
   CHECK(place.run("check valid.msh").status == 0);
 
+  place.run("optimize tangled.msh -o first.vtu --checkpoint c.bin --max-iterations 3");
+  const Run resumed =
+      place.run("optimize tangled.msh -o again.vtu --resume c.bin --max-iterations 3 --report again.json");
+  INFO(resumed.err);
+  CHECK(place.json("again.json")["recalled_stages"] > 0);
+  CHECK(content_of(place / "first.vtu") == content_of(place / "again.vtu"));
+
   // Options and files that do not go with it.
   for (const char* option : {"--sizes uniform", "--tolerance 1", "--lambda 1"}) {
     const Run refused = place.run("optimize tangled.msh -o x.vtu " + std::string(option));
