@@ -154,7 +154,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   Json input{{"target", describe(arguments.target, target)}};
   input[arguments.untangles ? "mesh" : "template"] = describe(arguments.template_mesh.path, template_mesh);
   if (arguments.untangles && !arguments.run.report.empty())
-    input["quality"] = quality_json(loaded.curved ? internal::measure_quality(*loaded.curved) : measure_quality(template_mesh));
+    input["quality"] =
+        quality_json(loaded.curved ? internal::measure_quality(*loaded.curved) : measure_quality(template_mesh));
   Checkpointing checkpointing(
       arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
   const Clock::time_point untangle_start = Clock::now();

@@ -19,7 +19,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kFlat = 1e-7;           ///< distance from a plane or a line, as a share of the size
+constexpr double kFlat = 1e-7;        ///< distance from a plane or a line, as a share of the size
 constexpr double kSameNormal = 1e-5;  ///< sine of the angle between normals
 
 /// The directions that a node may not move in: the sum of n n^T over unit vectors n.
