@@ -47,7 +47,7 @@ class AutomaticDriver {
   ~AutomaticDriver() = default;
 
   const AutomaticFitTrial& best() const { return result_.trials[result_.chosen]; }
-  /// Returns true if no other template needs to be tried.
+  /// Returns true if the best trial is good enough (`is_good_enough`).
   bool is_good() const { return !result_.trials.empty() && is_good_enough(best()); }
 
   /// Returns true if the present mesh is that of the best trial.

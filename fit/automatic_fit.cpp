@@ -6,6 +6,7 @@
 #include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/automatic_groups.h"
+#include "subvol/fit/automatic_state.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/edge_layout.h"
@@ -55,35 +56,6 @@ constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
 constexpr int kMostRoutings = 5;
 /// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
 constexpr double kWorthRefining = 0.5;
-
-/// The state of the sharp edges of a target.
-struct Edges {
-  TriangleMesh mesh;        ///< the target's triangles, oriented outward, in normalized coordinates
-  SignedFeatures features;  ///< no curves: there is nothing to follow
-};
-
-/// Tells what a trial was made from, and where it is not as good as aimed at.
-struct TrialStart {
-  AutomaticAttempt::Kind kind = AutomaticAttempt::Kind::smooth;
-  SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
-  std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
-  std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
-  std::vector<Index> lost;       ///< curves without a path
-};
-
-/// This is what a level needs of an edge layout. The layout belongs to a mesh; if that mesh is a cage, the faces and
-/// edges here are the parts of its own on the mesh that it is subdivided to.
-struct LevelLayout {
-  std::vector<Index> group_of_face;
-  QualityCaps caps;
-  FollowedCreases creases;
-};
-
-/// Tells which curves of the target a fit follows.
-struct EdgeChoice {
-  bool sharp = false, borders = false;  ///< sharp edges; borders of groups
-  bool any() const { return sharp || borders; }
-};
 
 /// An automatic fit of one solid.
 class AutomaticFit : AutomaticDriver {

@@ -44,7 +44,8 @@ double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& opti
 /// Returns true if all cells are certified and the boundary is found not to meet itself.
 bool is_valid(const AutomaticFitTrial& trial);
 
-/// Returns true if no other template needs to be tried, or if it was the last one, no smaller cells.
+/// Returns true if a trial is so good that it is polished, and neither smaller cells nor, with edges to follow, another
+/// template is tried.
 bool is_good_enough(const AutomaticFitTrial& trial);
 
 /// Returns true if both distances are within those allowed.

@@ -363,18 +363,13 @@ std::vector<Index> HighOrderDriver::far_cells(double percent) const {
 }
 
 std::vector<Vec3> HighOrderDriver::in_target_units(std::vector<Vec3> coefficients) const {
-  const std::size_t num_vertices = mesh_.space.num_vertices();
-  for (std::size_t i = 0; i < coefficients.size(); ++i)
-    coefficients[i] = target_.normalisation.diagonal * coefficients[i] +
-                      (i < num_vertices ? target_.normalisation.centre : Vec3(0, 0, 0));
-  return coefficients;
+  const auto& [centre, diagonal] = target_.normalisation;
+  return moved(std::move(coefficients), mesh_.space.num_vertices(), diagonal, centre);
 }
 
 HighOrderMesh HighOrderDriver::in_unit(HighOrderMesh mesh) const {
-  for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
-    mesh.coefficients[i] =
-        (mesh.coefficients[i] - (i < mesh.space.num_vertices() ? target_.normalisation.centre : Vec3(0, 0, 0))) /
-        target_.normalisation.diagonal;
+  const auto& [centre, diagonal] = target_.normalisation;
+  mesh.coefficients = moved(std::move(mesh.coefficients), mesh.space.num_vertices(), 1 / diagonal, -centre / diagonal);
   return mesh;
 }
 

@@ -330,19 +330,12 @@ Again HighOrderFit::draw_in_far_places() {
 
 /// Repeats the last stage around poor cells with higher and higher values of a setting.
 Again HighOrderFit::lift_by(double& setting, const LiftValues& values) {
-  const auto poor_cells = [&] {  // the poorest first
-    const std::vector<double>& minima = outcome_.cell_minima;
-    std::vector<Index> cells;
-    for (std::size_t c = 0; c < minima.size(); ++c)
-      if (minima[c] < options_.quality) cells.push_back(static_cast<Index>(c));
-    std::ranges::stable_sort(cells, {}, [&](Index c) { return minima[c]; });
-    return cells;
-  };
   const auto is_poor = [&] {
     return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < options_.quality;
   };
-  return lift(setting, values, is_poor,
-              [&](double value) { return run_again(poor_cells(), setting, value, kLiftSteps); });
+  return lift(setting, values, is_poor, [&](double value) {
+    return run_again(poor_cells(outcome_.cell_minima, options_.quality), setting, value, kLiftSteps);
+  });
 }
 
 /// Weighs places of poor shape more, and then penalizes their scaled Jacobians, as long as there are any. The penalty
@@ -373,7 +366,6 @@ HighOrderFitResult HighOrderFit::run_from(const HighOrderMesh& start) {
     set_orders(orders);
     try_ = 1;
     take_own_boxes();
-    stays_dense_ = false;
     for (const Stage& stage : schedule_.stages(approach_, order_, order_))
       if (!run_next_stage(stage)) return false;
     stays_dense_ = true;

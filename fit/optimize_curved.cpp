@@ -13,6 +13,7 @@
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/stages/quality_patches.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/untangle.h"
 #include "subvol/mesh/pyramids.h"
@@ -51,7 +52,7 @@ CurvedOptimizeOptions checked(const CurvedOptimizeOptions& options) {
   return options;
 }
 
-/// Vertices are moved to the unit box, modes are scaled as well.
+/// The map between a mesh and a box of diagonal 1 around the origin.
 struct UnitBox {
   Vec3 center;
   double diagonal;
@@ -63,20 +64,13 @@ struct UnitBox {
     diagonal = box.diagonal().norm();
     if (!(diagonal > 0)) throw InputError("mesh: all vertices are at one point");
   }
-  HighOrderMesh to_unit(HighOrderMesh mesh) const {
-    for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
-      mesh.coefficients[i] = (mesh.coefficients[i] - offset(mesh, i)) / diagonal;
-    return mesh;
-  }
-  HighOrderMesh from_unit(HighOrderMesh mesh) const {
-    for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
-      mesh.coefficients[i] = diagonal * mesh.coefficients[i] + offset(mesh, i);
-    return mesh;
-  }
+  HighOrderMesh to_unit(HighOrderMesh mesh) const { return changed(std::move(mesh), 1 / diagonal, -center / diagonal); }
+  HighOrderMesh from_unit(HighOrderMesh mesh) const { return changed(std::move(mesh), diagonal, center); }
 
  private:
-  Vec3 offset(const HighOrderMesh& mesh, std::size_t node) const {
-    return node < mesh.space.num_vertices() ? center : Vec3(0, 0, 0);
+  static HighOrderMesh changed(HighOrderMesh mesh, double scale, const Vec3& shift) {
+    mesh.coefficients = moved(std::move(mesh.coefficients), mesh.space.num_vertices(), scale, shift);
+    return mesh;
   }
 };
 
@@ -139,7 +133,7 @@ void CurvedOptimizer::find_sizes() {
   double volume = 0;
   for (const RegionQuality& region : measure_regions(mesh_, {}, nullptr).regions) volume += region.volume;
   std::vector<std::uint8_t> trusted;
-  for (const double least : measure().cell_minima) trusted.push_back(least > kTrustedJacobian);
+  for (const double least : quality_.cell_minima) trusted.push_back(least > kTrustedJacobian);
   constexpr double kLeastVolume = 1e-9;  // of a mesh that is turned inside out
   ideal_boxes_ = interpolated_boxes(labels_, vertices, std::max(volume, kLeastVolume), trusted);
 }
@@ -162,28 +156,16 @@ std::unique_ptr<HighOrderEnergy> CurvedOptimizer::volume_energy(const ElementSpa
 /// cells, nodes  numbers in the mesh of the cells and nodes of `space`.  unknowns: nodes of the mesh that may move.
 CurvedOptimizer::Part CurvedOptimizer::make_part(const ElementSpace& space, std::span<const Index> cells,
                                                  std::span<const Index> nodes, std::span<const Index> unknowns) const {
-  std::vector<Index> moving, number(mesh_.space.num_nodes(), kNoIndex);
-  std::vector<Vec3> x;
+  std::vector<Index> moving;  // ascending, as the unknowns are
+  std::vector<Vec3> x, fixed = mesh_.coefficients;
   std::vector<Mat3> projectors;
   for (const Index node : unknowns) {
     if (projectors_[node].isZero()) continue;
-    number[node] = static_cast<Index>(moving.size());
     moving.push_back(node);
     x.push_back(mesh_.coefficients[node]);
     projectors.push_back(projectors_[node]);
+    fixed[node].setZero();
   }
-  SparseMap map;
-  std::vector<Vec3> fixed;
-  for (const Index node : nodes) {
-    const bool moves = number[node] != kNoIndex;
-    if (moves) {
-      map.columns.push_back(number[node]);
-      map.values.push_back(1);
-    }
-    map.offsets.push_back(map.columns.size());
-    fixed.push_back(moves ? Vec3(0, 0, 0) : mesh_.coefficients[node]);
-  }
-  map.num_cols = moving.size();
   auto own_space = std::make_unique<const ElementSpace>(space);
   std::unique_ptr<HighOrderEnergy> volume = volume_energy(*own_space, cells);
   if (emphasis_ > 0) {
@@ -191,8 +173,9 @@ CurvedOptimizer::Part CurvedOptimizer::make_part(const ElementSpace& space, std:
     for (const Index node : nodes) coefficients.push_back(mesh_.coefficients[node]);
     volume->emphasize_poor(coefficients, emphasis_);
   }
-  FitProblem problem(std::move(map), SparseMap{moving.size(), {0}, {}, {}}, std::move(volume), nullptr, 1);
-  problem.fixed_nodes = std::move(fixed);
+  FitProblem problem(select(identity_map(fixed.size()), nodes, moving), SparseMap{moving.size(), {0}, {}, {}},
+                     std::move(volume), nullptr, 1);
+  for (const Index node : nodes) problem.fixed_nodes.push_back(fixed[node]);
   problem.projectors = std::move(projectors);
   return {std::move(own_space), std::move(problem), std::move(moving), std::move(x)};
 }
@@ -239,20 +222,19 @@ bool CurvedOptimizer::run_stage(const std::string& name, Part part, int steps) {
 bool CurvedOptimizer::untangle_cells() {
   constexpr int kExpectedSteps = 60, kMostParts = 4;
   runner_.work().begin_part(kShareOfCurvedUntangling, kExpectedSteps);
-  std::vector<Index> left;
+  const std::vector<Index>& left = quality_.certificate.not_certified;
   const auto untangle_part = [&](Part part, const char* name) {
     dynamic_cast<HighOrderEnergy&>(*part.problem.volume).set_most_own_emphasis(0);
     const UntangleOptions options{.max_rounds = kMostUntanglingRounds, .patience = kUntanglingPatience};
     const bool going =
         untangle(part.problem, part.space->num_cells(), options, runner_, record(name, part), part.x, report_).going;
     take(part);
-    left = measure().certificate.not_certified;
+    quality_ = measure();
     return going;
   };
   bool going = untangle_part(whole(), "untangle");
-  for (int n = 0; n < kMostParts && going && !left.empty(); ++n) {
+  for (int n = 0; n < kMostParts && going && !left.empty(); ++n)
     going = untangle_part(around(left), "untangle what is left");
-  }
   return going;
 }
 
@@ -261,10 +243,7 @@ bool CurvedOptimizer::untangle_cells() {
 Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValues& values) {
   const auto is_poor = [&] { return quality_.min_scaled_jacobian < options_.quality; };
   return lift(setting, values, is_poor, [&](double value) {
-    std::vector<Index> poor;
-    for (std::size_t c = 0; c < quality_.cell_minima.size(); ++c)
-      if (quality_.cell_minima[c] < options_.quality) poor.push_back(static_cast<Index>(c));
-    std::ranges::stable_sort(poor, {}, [&](Index c) { return quality_.cell_minima[c]; });
+    const std::vector<Index> poor = poor_cells(quality_.cell_minima, options_.quality);
     std::vector<Vec3> before = mesh_.coefficients;
     const double setting_before = std::exchange(setting, value);
     const std::size_t stages_before = report_.stages.size();
@@ -317,7 +296,6 @@ CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
   if (!was_valid) {
     find_sizes();
     going = untangle_cells();
-    quality_ = measure();
   }
   if (going && quality_.certificate.not_certified.empty()) going = improve();
   const double gain = quality_.min_scaled_jacobian - start.min_scaled_jacobian;

@@ -87,6 +87,28 @@ TriangleMesh surface_of(Content content, const std::filesystem::path& path, std:
   refuse_curved(path, "a surface is wanted");
 }
 
+/// Returns the curved cells of a file whose content was found to be neither linear cells nor a surface.
+HighOrderFile curved_cells(const std::filesystem::path& path, Content content, std::vector<std::string>& warnings,
+                           const std::string& references) {
+  HighOrderFile file = std::holds_alternative<ExactMap>(content)
+                           ? read_high_order(path)
+                           : curved_mesh(path.string(), std::get<NodalMesh>(std::move(content)), &warnings);
+  return as_chosen(extended(path, std::move(file)), references);
+}
+
+/// Reads a file of cells, linear or curved. InputError: it holds a surface or points.
+Content cells_in(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                 const std::string& references) {
+  const auto refuse_surface = [&] {
+    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
+  };
+  require_known_file(path);
+  if (is_surface_or_points(path)) refuse_surface();
+  Content content = content_of(path, warnings, check, array_of(references));
+  if (std::holds_alternative<PolygonMesh>(content)) refuse_surface();
+  return content;
+}
+
 constexpr int kCellDimension = 3;
 
 /// Returns the number of the region with this name or number. UsageError: there is none; it begins with `option`.
@@ -120,10 +142,7 @@ LoadedMesh load_mesh(const std::filesystem::path& path, std::vector<std::string>
   Content content = content_of(path, warnings, check, array_of(references));
   if (auto* mesh = std::get_if<VolumeMesh>(&content)) return as_chosen(std::move(*mesh), references);
   if (auto* surface = std::get_if<PolygonMesh>(&content)) return std::move(*surface);
-  HighOrderFile file = std::holds_alternative<ExactMap>(content)
-                           ? read_high_order(path)
-                           : curved_mesh(path.string(), std::get<NodalMesh>(std::move(content)), &warnings);
-  return as_chosen(extended(path, std::move(file)), references);
+  return curved_cells(path, std::move(content), warnings, references);
 }
 
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
@@ -188,15 +207,9 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
 
 LoadedCells load_cells(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
-  const auto refuse_surface = [&] {
-    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
-  };
-  require_known_file(path);
-  if (is_surface_or_points(path)) refuse_surface();
-  LoadedMesh mesh = load_mesh(path, warnings, check, references);
-  if (std::holds_alternative<PolygonMesh>(mesh)) refuse_surface();
-  if (auto* linear = std::get_if<VolumeMesh>(&mesh)) return std::move(*linear);
-  return std::get<HighOrderFile>(std::move(mesh));
+  Content content = cells_in(path, warnings, check, references);
+  if (auto* linear = std::get_if<VolumeMesh>(&content)) return as_chosen(std::move(*linear), references);
+  return curved_cells(path, std::move(content), warnings, references);
 }
 
 VolumeMesh labels_of(const HighOrderFile& file) {
@@ -209,10 +222,10 @@ VolumeMesh labels_of(const HighOrderFile& file) {
 
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
-  LoadedCells cells = load_cells(path, warnings, check, references);
-  if (!std::holds_alternative<VolumeMesh>(cells))
+  Content content = cells_in(path, warnings, check, references);
+  if (!std::holds_alternative<VolumeMesh>(content))
     refuse_curved(path, "linear cells are wanted: " + volume_mesh_formats());
-  return std::get<VolumeMesh>(std::move(cells));
+  return as_chosen(std::get<VolumeMesh>(std::move(content)), references);
 }
 
 std::vector<Group> regions_of(const VolumeMesh& mesh) {

@@ -201,12 +201,20 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
                                                                                 MeshTopology(cage))));
 }
 
+namespace {
+
+/// Writes the cells of one region, linear or curved, as a whole mesh.
+template <class Mesh>
+void write_region(const Output& output, const Mesh& mesh, const WritingOptions& options) {
+  Output whole = output;
+  whole.part = Part::result;
+  write_output(whole, cells_of_region(mesh, output.region), options);
+}
+
+}  // namespace
+
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
-  if (output.part == Part::region) {
-    Output whole = output;
-    whole.part = Part::result;
-    return write_output(whole, cells_of_region(mesh, output.region), options);
-  }
+  if (output.part == Part::region) return write_region(output, mesh, options);
   if (output.part == Part::boundary) return write_boundary_faces(output, mesh);
   if (output.is_volume()) return write_cells(output, mesh, options);
   if (output.part == Part::cutaway)
@@ -218,11 +226,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 }
 
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
-  if (output.part == Part::region) {
-    Output whole = output;
-    whole.part = Part::result;
-    return write_output(whole, cells_of_region(file, output.region), options);
-  }
+  if (output.part == Part::region) return write_region(output, file, options);
   const HighOrderMesh& mesh = file.mesh;
   require_for_curved_cells(output);
   if (output.part == Part::boundary && output.extension == ".xdmf")

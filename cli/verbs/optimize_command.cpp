@@ -86,7 +86,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
 void add_optimize_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("optimize", "Untangle and improve a volume mesh, or curve it");
   const auto arguments = std::make_shared<OptimizeArguments>();
-  verb->add_option("MESH", arguments->mesh, "Hexes, prisms, tets and pyramids: " + volume_mesh_formats())
+  verb->add_option("MESH", arguments->mesh, "Hexes, prisms, tets and pyramids, linear or curved: " + cell_formats())
       ->required()
       ->type_name("FILE");
   add_references_option(*verb, arguments->run);

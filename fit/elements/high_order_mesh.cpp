@@ -83,6 +83,13 @@ VolumeMesh HighOrderMesh::straight_sided() const {
   return mesh;
 }
 
+std::vector<Vec3> internal::moved(std::vector<Vec3> coefficients, std::size_t num_vertices, double scale,
+                                  const Vec3& shift) {
+  for (std::size_t i = 0; i < coefficients.size(); ++i)
+    coefficients[i] = scale * coefficients[i] + (i < num_vertices ? shift : Vec3(0, 0, 0));
+  return coefficients;
+}
+
 void require_inside(const char* function, const ElementSpace& space, std::span<const CellPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto& [c, point] = points[i];

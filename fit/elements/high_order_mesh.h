@@ -31,6 +31,14 @@ struct HighOrderMesh {
   VolumeMesh straight_sided() const;
 };
 
+namespace internal {
+
+/// Returns the coefficients of a mesh after the map x -> scale x + shift: modes are displacements, so they are not
+/// shifted.
+std::vector<Vec3> moved(std::vector<Vec3> coefficients, std::size_t num_vertices, double scale, const Vec3& shift);
+
+}  // namespace internal
+
 /// A point of a cell, in canonical coordinates.
 struct CellPoint {
   Index cell;

@@ -33,8 +33,8 @@ struct RegularisedBatch {
 /// Fills everything. epsilon > 0, dimensionless.
 void regularised_barrier(RegularisedBatch& batch, double epsilon);
 
-/// The same in the form of the other distortions, with coupled stretches. With J = U diag(s) V^T, U and V rotations and
-/// s_2 of the sign of D, C = U diag(D / s_i) V^T, so that
+/// These functions evaluate the barrier in the form of the other distortions, with coupled stretches. U and V are the
+/// rotations of J = U diag(s) V^T, where s_2 has the sign of D. Then C = U diag(c) V^T, and so
 ///
 ///   stretch_i = alpha + 2 beta D + gamma c_i^2,  coupling_ij = beta (s_i c_j + s_j c_i) + gamma c_i c_j,
 ///   pair_same = alpha,  pair_cross = 0,  c_i = D / s_i

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/base/types.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
 namespace subvol::internal {
 
 /// Values of a setting that lifts poor curved cells: the first one, multiplied each time by the factor, up to the last.
@@ -13,6 +20,15 @@ inline constexpr int kLiftSteps = 8;
 /// The threshold of the hinge is the quality aimed at plus this. At order 4, a bone of 87 hexes came to a least scaled
 /// Jacobian of 0.66 with 0.05, and to 0.76 with 0.2; a double torus gained nothing with 0.35.
 inline constexpr double kHingeAboveQuality = 0.2;
+
+/// Returns the cells whose least scaled Jacobian is below this quality, the poorest first.
+inline std::vector<Index> poor_cells(std::span<const double> cell_minima, double quality) {
+  std::vector<Index> cells;
+  for (std::size_t c = 0; c < cell_minima.size(); ++c)
+    if (cell_minima[c] < quality) cells.push_back(static_cast<Index>(c));
+  std::ranges::stable_sort(cells, {}, [&](Index c) { return cell_minima[c]; });
+  return cells;
+}
 
 /// Outcome of a repeated minimization; ended: it was interrupted.
 enum class Again { kept, undone, ended };

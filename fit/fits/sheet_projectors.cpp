@@ -43,7 +43,7 @@ struct Barred {
   }
 };
 
-/// What bars the nodes of vertices, edges and faces.
+/// Finds the directions that are barred to the nodes of each vertex, edge and face.
 class SheetBars {
  public:
   SheetBars(const HighOrderMesh& mesh, const VolumeMesh& labels)
