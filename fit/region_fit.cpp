@@ -59,7 +59,8 @@ class RegionFit : AutomaticDriver {
   bool run_smooth(std::size_t cells);
   bool run_curves(std::size_t cells);
   std::optional<VolumeMesh> make_grid(std::size_t cells);
-  VolumeMesh pillowed(const VolumeMesh& grid) const;
+  PillowChoice pillow_choice(const VolumeMesh& grid) const;
+  bool is_exact(const VolumeMesh& grid) const;
   bool lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const;
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) override;
   void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
@@ -135,11 +136,22 @@ bool RegionFit::lies_on_target(std::span<const std::array<Index, 4>> faces, cons
   return true;
 }
 
-VolumeMesh RegionFit::pillowed(const VolumeMesh& grid) const {
-  return pillow_regions(grid, [&](int, std::span<const std::array<Index, 4>> part) {
+/// Returns the choice of the parts of regions' boundaries that do not lie on the grid's own faces.
+PillowChoice RegionFit::pillow_choice(const VolumeMesh& grid) const {
+  return [&](int, std::span<const std::array<Index, 4>> part) {
     // Layers that were added before leave the sheets on the grid's own vertices.
     return !lies_on_target(part, grid);
-  });
+  };
+}
+
+/// Returns true if all sheets of a grid lie on the target.
+bool RegionFit::is_exact(const VolumeMesh& grid) const {
+  const MeshTopology topology(grid);
+  std::vector<Index> sheets = find_interfaces(grid, topology).faces;
+  sheets.insert(sheets.end(), topology.boundary_faces().begin(), topology.boundary_faces().end());
+  std::vector<std::array<Index, 4>> faces(sheets.size());
+  for (std::size_t i = 0; i < sheets.size(); ++i) std::ranges::copy(topology.face(sheets[i]), faces[i].begin());
+  return lies_on_target(faces, grid);
 }
 
 void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const {
@@ -175,7 +187,7 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
   boundary.triangle_faces = samples.triangle_faces;
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
-    boundary.group_of_face = groups_of_faces(*layout_, mesh_);
+    boundary.group_of_face = layout_->group_of_face;
     for (const Index t : target_.region_triangle) boundary.group_of_triangle.push_back(layout_->group_of_triangle[t]);
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
@@ -233,7 +245,7 @@ bool RegionFit::run_smooth(std::size_t cells) {
     for (int round = 1;; ++round) {
       const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
       if (!grid) return false;
-      mesh_ = pillowed(*grid);
+      mesh_ = pillow_regions(*grid, pillow_choice(*grid));
       const std::size_t got = mesh_.num_cells();
       if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
       asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
@@ -249,7 +261,7 @@ bool RegionFit::run_smooth(std::size_t cells) {
   return fit_and_refine(levels);
 }
 
-/// Fits a grid whose sheets are routed and pillowed.
+/// Fits a grid whose sheets are routed and padded.
 bool RegionFit::run_curves(std::size_t cells) {
   constexpr double kRoom = 0.85, kLess = 0.95;
   constexpr int kTries = 3;
@@ -257,24 +269,22 @@ bool RegionFit::run_curves(std::size_t cells) {
   for (int round = 1;; ++round) {
     const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
     if (!grid) return !no_template_.empty();
-    VolumeMesh padded = pillowed(*grid);
-    if (padded.num_cells() > cells && options_.cells && round < kTries) {
-      asked *= kLess * static_cast<double>(cells) / static_cast<double>(padded.num_cells());
-      continue;
-    }
-    const bool is_exact = padded.num_cells() == grid->num_cells();
     mesh_ = *grid;
     layout_.reset();
-    if (!is_exact && !fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
+    if (!is_exact(*grid) && !fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
       if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
       return false;
     }
     RoutingOptions routing;
     routing.cancelled = [this] { return runner_.is_to_end(); };
-    layout_ = sheet_layout(mesh_, unit_, curves_, routing);
-    mesh_ = std::move(padded);
-    mesh_.tags = layout_->tagged_mesh.tags;
-    return fit_edges({.template_cells = grid->num_cells()}, 1) && relax_last_trial();
+    layout_ = sheet_layout(*grid, mesh_.positions, unit_, curves_, routing, pillow_choice(*grid));
+    mesh_ = layout_->tagged_mesh;
+    if (mesh_.num_cells() > cells && options_.cells && round < kTries) {
+      asked *= kLess * static_cast<double>(cells) / static_cast<double>(mesh_.num_cells());
+      continue;
+    }
+    AutomaticFitTrial trial{.template_cells = grid->num_cells(), .pads = layout_->pads.value_or(0)};
+    return fit_edges(std::move(trial), 1) && relax_last_trial();
   }
 }
 

@@ -183,13 +183,16 @@ class PadChoice {
 
   PadReport run() {
     unite_over_flat_paths();
+    for (const auto& [a, b] : patched_.united) sets_.unite(a, b);
+    apply_rules();
     while (add_one()) continue;
     return std::move(report_);
   }
 
   /// Puts a single pad under all patches. Returns nothing if that is not possible.
   std::optional<PadReport> run_on_all() {
-    if (make(std::vector<std::uint8_t>(patched_.patches.count, 1))) return std::nullopt;
+    const std::vector<std::uint8_t> all(patched_.patches.count, 1);
+    if (has_never(all) || make(all)) return std::nullopt;
     return std::move(report_);
   }
 
@@ -202,6 +205,25 @@ class PadChoice {
       const auto faces = fans.faces_at(static_cast<Index>(e));
       sets_.unite(patched_.patches.of_face[faces[0]], patched_.patches.of_face[faces[1]]);
     }
+  }
+
+  /// Takes sets that are padded never, or not for their own sake, for done.
+  void apply_rules() {
+    if (patched_.rules.empty()) return;
+    std::ranges::fill(done_, 1);
+    for (const PadRule rule : {PadRule::free, PadRule::never})
+      for (std::size_t p = 0; p < patched_.rules.size(); ++p)
+        if (patched_.rules[p] == rule) done_[sets_.of(static_cast<Index>(p))] = rule == PadRule::never;
+  }
+
+  bool has_shared(Index set) const {
+    return std::ranges::any_of(sets_.members(set), [&](Index p) { return patched_.shared[p] != 0; });
+  }
+
+  bool has_never(std::span<const std::uint8_t> is_padded) const {
+    for (std::size_t p = 0; p < patched_.rules.size(); ++p)
+      if (is_padded[p] && patched_.rules[p] == PadRule::never) return true;
+    return false;
   }
 
   /// Makes the pad that is wanted most. Returns false if none is wanted or possible.
@@ -230,25 +252,31 @@ class PadChoice {
     while ((refusal = topological_refusal(scores.fans(), patched_, is_padded))) {
       const Index neighbor = neighbor_to_add(scores, refusal->vertex, is_padded);
       if (neighbor == kNoIndex) return refusal;
+      if (!patched_.grows_to_shared && has_shared(neighbor)) return refusal;
       add_set(neighbor, is_padded);
+      if (has_never(is_padded)) return refusal;
     }
     return std::nullopt;
   }
 
-  /// Returns the set at a vertex that is wanted most; if the pad does not touch itself there, next to a padded face.
+  /// Returns the set at a vertex that is wanted most: of a shared patch if that is the problem; otherwise, if the pad
+  /// does not touch itself there, next to a padded face.
   Index neighbor_to_add(const PadScores& scores, Index vertex, std::span<const std::uint8_t> is_padded) const {
     const PatchFans& fans = scores.fans();
     std::vector<PatchFans::Place> fan;
     const auto surface_vertex =
         std::ranges::lower_bound(fans.boundary.vertices, vertex) - fans.boundary.vertices.begin();
     fans.fan_at(static_cast<Index>(surface_vertex), fan);
-    const bool anywhere = fan_state(fans, patched_, fan, is_padded).changes > 2;
+    const std::optional<PadProblem> problem = fan_state(fans, patched_, fan, is_padded).problem();
+    const bool only_shared = problem == PadProblem::moves_shared;
+    const bool anywhere = only_shared || problem == PadProblem::touches_itself;
     const auto padded = [&](std::size_t i) {
       return is_padded[patched_.patches.of_face[fan[i % fan.size()].face]] != 0;
     };
     Index best = kNoIndex;
     for (std::size_t i = 0; i < fan.size(); ++i) {
       if (padded(i) || !(anywhere || padded(i + 1) || padded(i + fan.size() - 1))) continue;
+      if (only_shared && !patched_.shared[patched_.patches.of_face[fan[i].face]]) continue;
       const Index set = sets_.of(patched_.patches.of_face[fan[i].face]);
       if (best == kNoIndex || scores.of(set) > scores.of(best)) best = set;
     }
@@ -293,7 +321,7 @@ PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
       throw InputError("add_pads: there is no curve " + std::to_string(path.curve));
   PatchedMesh all = patched;
   PadReport report = PadChoice(patched, features).run();
-  if (report.missed.empty()) return report;
+  if (report.missed.empty() || !patched.grows_to_shared) return report;
   std::optional<PadReport> report_of_all = PadChoice(all, features).run_on_all();
   if (!report_of_all || reasons_left(all, features) >= reasons_left(patched, features)) return report;
   patched = std::move(all);

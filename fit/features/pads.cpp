@@ -61,7 +61,9 @@ class PadBuilder {
     add_cells(result);
     if (const auto inverted = shorten_steps(result.mesh)) return inverted;
     for (CreasePath& path : result.paths) path.vertices = moved_path(path.vertices);
+    for (CreasePath& path : result.inner_paths) path.vertices = moved_path(path.vertices);
     move_angles(result);
+    move_inner_faces(result);
     return std::nullopt;
   }
 
@@ -227,6 +229,19 @@ class PadBuilder {
     std::ranges::sort(result.angles, {}, &EdgeAngle::ends);
   }
 
+  /// Adds the sides of new cells at which inner faces end.
+  void move_inner_faces(PatchedMesh& result) const {
+    for (std::size_t f = 0; f < old_.inner_faces.size(); ++f) {
+      const InnerFace& face = old_.inner_faces[f];
+      const std::size_t size = face.vertices().size();
+      for (std::size_t i = 0; i < size; ++i) {
+        const Index v = face.corners[i], w = face.corners[(i + 1) % size];
+        if (stays(v, w)) result.inner_faces.push_back({{v, w, moved(w), moved(v)}, face.patch});
+        result.inner_faces[f].corners[i] = moved(v);
+      }
+    }
+  }
+
   const PatchedMesh& old_;
   PatchFans fans_;
   std::vector<std::uint8_t> is_padded_;   ///< by patch
@@ -242,6 +257,8 @@ std::string to_string(PadProblem problem) {
   switch (problem) {
     case PadProblem::touches_itself: return "the pad would touch itself";
     case PadProblem::too_many_paths: return "the pad would split a corner";
+    case PadProblem::moves_shared:
+      return "the pad would move faces of cells beyond";
     case PadProblem::inverted: return "the pad would invert a cell";
   }
   return "unknown";

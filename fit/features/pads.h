@@ -7,13 +7,29 @@
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace subvol::internal {
+
+/// A face inside a mesh that belongs to a patch, as those of interfaces between regions do.
+struct InnerFace {
+  std::array<Index, 4> corners;  ///< kNoIndex after those of a triangle
+  Index patch;
+  std::span<const Index> vertices() const { return {corners.data(), corners[3] == kNoIndex ? 3u : 4u}; }
+};
+
+/// Says when a patch may be padded.
+enum class PadRule : std::uint8_t {
+  free,
+  joining,  ///< only together with free ones that cannot be padded without it
+  never
+};
 
 /// A mesh whose boundary is divided into patches by paths along the sharp edges of a target.
 struct PatchedMesh {
@@ -23,6 +39,16 @@ struct PatchedMesh {
   std::vector<PlacedCorner> corners;  ///< ascending by vertex
   BoundaryPatches patches;
   std::vector<EdgeAngle> angles;  ///< of the boundary edges on no path; edges that are missing count as flat
+  /// What lies inside the mesh and moves with its vertices.
+  std::vector<InnerFace> inner_faces;
+  std::vector<CreasePath> inner_paths;
+  /// Pairs of patches that are padded together or not at all, besides those on both sides of a nearly flat path.
+  std::vector<std::array<Index, 2>> united;
+  std::vector<PadRule> rules;  ///< one per patch; empty: all are PadRule::free
+  /// One entry per patch: 1 if its faces are faces of other cells as well, which are not in this mesh. Pads leave their
+  /// vertices where they are. Empty: none.
+  std::vector<std::uint8_t> shared;
+  bool grows_to_shared = true;  ///< false: a pad that cannot be without another shared patch is not made
 };
 
 /// Divides the boundary of a mesh along the paths of a routing.
@@ -38,6 +64,7 @@ PatchedMesh patched_mesh(VolumeMesh mesh, std::vector<Vec3> fitted, const Featur
 enum class PadProblem {
   touches_itself,  ///< two fans of padded faces meet at a vertex
   too_many_paths,  ///< two paths run through the faces at a vertex that are not padded: it would become two vertices
+  moves_shared,    ///< a face of `PatchedMesh::shared` that is not padded has a vertex in common with one that is
   inverted         ///< no step keeps all cells valid
 };
 
@@ -62,6 +89,7 @@ struct PadRefusal {
 /// So an edge of the border has one cell afterwards, and the edge between its new vertices one more than it had before.
 /// Paths at the border or inside the patches keep their old vertices; others get new ones. A path that ends at the
 /// border from outside is continued by the edge from the new to the old vertex, so that corners stay where they are.
+/// Where an inner face ends at a padded one, a side between two new cells is added to it.
 ///
 /// From its old vertex, a new one lies 0.2 of the shortest edge there times the sum of the distinct normals away,
 /// inward; less if a cell would be inverted. Their fitted positions are the same.
@@ -92,8 +120,8 @@ struct PadReport {
 
 /// Pads patches, one set after the other, where angles of the boundary do not suit the number of cells there.
 ///
-/// Patches on both sides of a path with an angle above 150 degrees belong to one set, since no pad may end there. These
-/// are reasons to pad a set:
+/// Patches on both sides of a path with an angle above 150 degrees belong to one set, since no pad may end there, and
+/// so do those of `united`. These are reasons to pad a set:
 ///
 ///   - an edge inside it at which the target's angle divided by the number of cells is above 140 or below 42 degrees;
 ///     an edge at its border counts half, for both sets;

@@ -60,6 +60,7 @@ FanState fan_state(const PatchFans& fans, const PatchedMesh& patched, std::span<
     state.any |= after;
     state.changes += before != after;
     state.free_paths += !before && !after && fans.path_of_edge[fan[i].edge] != kNoIndex;
+    state.shared |= !after && !patched.shared.empty() && patched.shared[patched.patches.of_face[fan[i].face]] != 0;
   }
   return state;
 }
@@ -67,6 +68,7 @@ FanState fan_state(const PatchFans& fans, const PatchedMesh& patched, std::span<
 std::optional<PadProblem> FanState::problem() const {
   if (any && changes > 2) return PadProblem::touches_itself;
   if (any && free_paths > 1) return PadProblem::too_many_paths;
+  if (any && shared) return PadProblem::moves_shared;
   return std::nullopt;
 }
 

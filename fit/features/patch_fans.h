@@ -46,6 +46,7 @@ struct FanState {
   bool any = false;    ///< some face is padded
   int changes = 0;     ///< number of edges between a padded and an unpadded face
   int free_paths = 0;  ///< number of edges of paths between unpadded faces
+  bool shared = false;  ///< some unpadded face is shared
   std::optional<PadProblem> problem() const;
 };
 FanState fan_state(const PatchFans& fans, const PatchedMesh& patched, std::span<const PatchFans::Place> fan,

@@ -5,13 +5,13 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/boundary_patches.h"
+#include "subvol/fit/features/sheet_pads.h"
+#include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <algorithm>
-#include <map>
-#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -92,21 +92,24 @@ SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angl
   return result;
 }
 
-SheetLayout sheet_layout(const VolumeMesh& mesh, const RegionSurface& target, const SheetCurves& curves,
-                         const RoutingOptions& options) {
+SheetLayout sheet_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const RegionSurface& target,
+                         const SheetCurves& curves, const RoutingOptions& options, const PillowChoice& pillow) {
+  VolumeMesh near_target = grid;
+  near_target.tags = {};
+  near_target.positions.assign(fitted.begin(), fitted.end());
   SheetLayout layout;
-  layout.tagged_mesh = mesh;
-  layout.tagged_mesh.tags = {};
   RoutingOptions routing = options;
   routing.on_sheets = true;
   routing.along_sheet_curves = curves.are_junctions;
-  layout.routing = route_features(layout.tagged_mesh, curves.features, routing);
-  const MeshTopology topology(mesh);
-  const SheetFaces sheets = sheet_faces(mesh, topology);
+  layout.routing = route_features(near_target, curves.features, routing);
+  const MeshTopology topology(grid);
+  const SheetFaces sheets = sheet_faces(grid, topology);
   std::vector<Index> patch_of_sheet_face;
-  layout.num_patches = divide(topology, sheets, layout.routing.paths, patch_of_sheet_face);
-  layout.patch_of_face.assign(topology.num_faces(), kNoIndex);
-  for (std::size_t i = 0; i < sheets.faces.size(); ++i) layout.patch_of_face[sheets.faces[i]] = patch_of_sheet_face[i];
+  PatchedSheets patched{grid, near_target.positions, layout.routing.paths, layout.routing.corners, {}, 0};
+  patched.mesh.tags = {};
+  patched.num_patches = divide(topology, sheets, layout.routing.paths, patch_of_sheet_face);
+  for (std::size_t i = 0; i < sheets.faces.size(); ++i)
+    patched.patches[face_key(topology.face(sheets.faces[i]))] = patch_of_sheet_face[i];
 
   const std::vector<std::array<int, 2>> pairs = region_pairs(target);
   const auto key_of = [&](const std::array<int, 2>& pair) {
@@ -119,31 +122,23 @@ SheetLayout sheet_layout(const VolumeMesh& mesh, const RegionSurface& target, co
   std::vector<Index> key_of_face, key_of_triangle;
   for (const auto& pair : sheets.pairs) key_of_face.push_back(key_of(pair));
   for (std::size_t t = 0; t < target.sides.size(); ++t) key_of_triangle.push_back(key_of(target.pair(t)));
-  const PatchGroups groups =
-      sheet_patch_groups(topology, sheets.faces, patch_of_sheet_face, layout.num_patches, key_of_face, mesh.positions,
-                         target.mesh, curves.features.regions, curves.features.num_regions, key_of_triangle);
-  layout.group_of_patch = groups.of_patch;
+  const PatchGroups groups = sheet_patch_groups(topology, sheets.faces, patch_of_sheet_face, patched.num_patches,
+                                                key_of_face, near_target.positions, target.mesh,
+                                                curves.features.regions, curves.features.num_regions, key_of_triangle);
   for (const Index region : curves.features.regions) layout.group_of_triangle.push_back(groups.of_region[region]);
 
-  layout.creases = FollowedCreases(followed_parts(mesh, curves.features, layout.routing), layout.routing.paths,
-                                   layout.tagged_mesh);
-  for (const CreasePath& path : layout.routing.paths)
+  layout.pads = pad_sheets(patched, target, curves.features.curves);
+  layout.tagged_mesh = layout.pads ? std::move(patched.mesh) : pillow_regions(patched.mesh, pillow);
+  layout.creases =
+      FollowedCreases(followed_parts(near_target, curves.features, layout.routing), patched.paths, layout.tagged_mesh);
+  for (const CreasePath& path : patched.paths)
     for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
       layout.segments.push_back({{path.vertices[i], path.vertices[i + 1]}, path.curve});
+  const MeshTopology padded(layout.tagged_mesh);
+  layout.group_of_face.assign(padded.num_faces(), 0);
+  for (const Index f : sheet_faces(layout.tagged_mesh, padded).faces)
+    layout.group_of_face[f] = groups.of_patch[patched.patches.at(face_key(padded.face(f)))];
   return layout;
-}
-
-std::vector<Index> groups_of_faces(const SheetLayout& layout, const VolumeMesh& mesh) {
-  std::map<FaceKey, Index> groups;
-  const MeshTopology before(layout.tagged_mesh), topology(mesh);
-  for (std::size_t f = 0; f < layout.patch_of_face.size(); ++f)
-    if (layout.patch_of_face[f] != kNoIndex)
-      groups[face_key(before.face(static_cast<Index>(f)))] = layout.group_of_patch[layout.patch_of_face[f]];
-  std::vector<Index> result(topology.num_faces(), 0);
-  for (std::size_t f = 0; f < result.size(); ++f)
-    if (const auto at = groups.find(face_key(topology.face(static_cast<Index>(f)))); at != groups.end())
-      result[f] = at->second;
-  return result;
 }
 
 }  // namespace subvol::internal

@@ -6,6 +6,7 @@
 #include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/region_surface.h"
+#include "subvol/templates/pillow.h"
 
 #include <array>
 #include <cstdint>
@@ -24,28 +25,28 @@ struct SheetCurves {
 /// Finds the curves along which sheets meet and, with an angle, edges that are sharper.
 SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angle_degrees);
 
-/// A mesh with regions prepared to follow the curves of a target.
+/// A grid with regions prepared to follow the curves of a target: routed, divided into patches and padded.
 struct SheetLayout {
   FeatureRouting routing;
-  VolumeMesh tagged_mesh;               ///< the mesh with tags on the edges of the paths
+  std::optional<std::size_t> pads;      ///< number of pads; nothing: the regions have pillows instead
+  VolumeMesh tagged_mesh;               ///< the mesh to fit, from its positions, with tags on the edges of the paths
   FollowedCreases creases;              ///< of that mesh
-  std::vector<CreaseSegment> segments;  ///< edges of the paths, and the curves they follow
-  std::vector<Index> patch_of_face;  ///< of each face, by `MeshTopology`: faces of sheets between curves; else kNoIndex
-  std::size_t num_patches = 0;
-  std::vector<Index> group_of_patch, group_of_triangle;  ///< what belongs to each other (`ClosestPointEnergy`)
+  std::vector<CreaseSegment> segments;  ///< edges of the paths between its vertices, and the curves they follow
+  /// What belongs to each other (`ClosestPointEnergy`): the group of each face of the mesh, by `MeshTopology`, 0 for
+  /// faces inside regions; and of each triangle of the target.
+  std::vector<Index> group_of_face, group_of_triangle;
 };
 
-/// Routes the curves (`route_features`) and divides the sheets of the mesh along them. Parts of sheets correspond only
-/// to parts of the target between the same two regions.
+/// Routes the curves (`route_features`), divides the sheets of the mesh along them and pads them (`pad_sheets`). If
+/// that is not possible, regions are pillowed instead (`pillow_regions`). Parts of sheets correspond only to parts of
+/// the target between the same two regions.
 ///
-/// mesh     hexes with references, near the target and in its coordinates; its interfaces lie between the same pairs of
-///          regions. Its tags are dropped.
-/// InputError: as `route_features`; a pair of regions that the target lacks.
-SheetLayout sheet_layout(const VolumeMesh& mesh, const RegionSurface& target, const SheetCurves& curves,
-                         const RoutingOptions& options);
-
-/// Returns the group of each face of a mesh that has the sheets of a layout's mesh, on the same vertices; 0 for faces
-/// inside regions.
-std::vector<Index> groups_of_faces(const SheetLayout& layout, const VolumeMesh& mesh);
+/// grid     hexes with references; its interfaces lie between the same pairs of regions as those of the target. Its
+///          tags are dropped.
+/// fitted   positions of its vertices near the target, in its coordinates.
+/// pillow   the layers of regions that have no pads.
+/// InputError: as `route_features`, `pad_sheets`, `pillow_regions`; a pair of regions that the target lacks.
+SheetLayout sheet_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const RegionSurface& target,
+                         const SheetCurves& curves, const RoutingOptions& options, const PillowChoice& pillow);
 
 }  // namespace subvol::internal

@@ -78,13 +78,35 @@ TEST_CASE("A layered cylinder keeps its layers", "[regions][slow]") {
   REQUIRE(surface);
   AutomaticFitOptions options;
   options.cells = 8000;
-  fitted(*surface, options, 0.35, 0.1);
+  const AutomaticFitResult result = fitted(*surface, options, 0.6, 0.1);
+  CHECK(result.trials[result.chosen].pads > 0);
+}
+
+TEST_CASE("Layers on both sides of a tilted interface end at the sides of the box", "[regions]") {
+  const auto surface = find_regions(test::tilted_cut_surface(0.5));
+  REQUIRE(surface);
+  AutomaticFitOptions options;
+  options.cells = 1500;
+  const AutomaticFitResult result = fitted(*surface, options, 0.65, 1e-3);
+  CHECK(result.trials[result.chosen].pads == 2);
+  CHECK(result.trials[result.chosen].max_percent < 1e-3);
+}
+
+TEST_CASE("The layers around a core that is cut across go through both of its parts", "[regions]") {
+  const TriangleMesh lower = test::layered_cylinder({0.5, 1}, 1, 48);
+  TriangleMesh upper = lower;
+  for (Vec3& p : upper.positions) p.z() += 1;
+  const auto surface = find_regions(together(lower, upper));
+  REQUIRE(surface);
+  REQUIRE(surface->regions.size() == 4);
+  AutomaticFitOptions options;
+  options.cells = 4000;
+  fitted(*surface, options, 0.6, 0.1);
 }
 
 TEST_CASE("Nested balls with a thin skin keep their volumes", "[regions][slow]") {
-  const auto surface =
-      find_regions(together(together(ball_surface({0, 0, 0}, 1, 40), ball_surface({0, 0, 0}, 0.9, 40)),
-                            ball_surface({0.1, 0, 0}, 0.5, 24)));
+  const auto surface = find_regions(together(together(ball_surface({0, 0, 0}, 1, 40), ball_surface({0, 0, 0}, 0.9, 40)),
+                                             ball_surface({0.1, 0, 0}, 0.5, 24)));
   REQUIRE(surface);
   AutomaticFitOptions options;
   options.cells = 30000;

@@ -59,6 +59,14 @@ inline TriangleMesh slabs_surface(int count) {
   return mesh;
 }
 
+/// The lower and the upper part of a unit cube, cut by a plane that rises by `rise` along x.
+inline TriangleMesh tilted_cut_surface(double rise) {
+  TriangleMesh mesh = slabs_surface(2);
+  for (Vec3& p : mesh.positions)
+    if (p.z() == 0.5) p.z() += rise * (p.x() - 0.5);
+  return mesh;
+}
+
 /// A cylinder around the z axis from 0 to `height`, in layers between the radii; each wall and each ring of the caps is
 /// there once. n: number of parts around.
 inline TriangleMesh layered_cylinder(const std::vector<double>& radii, double height, int n) {
