@@ -10,11 +10,14 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <set>
 #include <utility>
 
 namespace subvol {
 namespace {
+
+constexpr const char* kRegionColorMap = "viridis, one color for each region";
 
 /// Visible faces, by their numbers in MeshTopology, and the cells behind them.
 struct SeenFaces {
@@ -54,18 +57,16 @@ PolygonMesh polygons_of(const BoundarySamples& samples, const HighOrderMesh& mes
   return as_polygons(triangles);
 }
 
-/// Gives every face its own vertices, appended to the existing ones, so that colors end at the edges of faces.
-void part_faces(PolygonMesh& mesh, const std::vector<Index>& polygon_faces) {
-  std::vector<Index> copy(mesh.positions.size(), kNoIndex), face_of_copy(mesh.positions.size(), kNoIndex);
+/// Gives polygons with different keys, faces or regions, vertices of their own, appended to the existing ones, so that
+/// colors end where keys change.
+void part(PolygonMesh& mesh, const std::vector<Index>& keys) {
+  std::map<std::pair<Index, Index>, Index> copies;  // of a vertex for a key
   for (std::size_t p = 0; p < mesh.num_faces(); ++p)
     for (std::size_t k = mesh.face_offsets[p]; k < mesh.face_offsets[p + 1]; ++k) {
       const Index v = mesh.face_vertices[k];
-      if (face_of_copy[v] != polygon_faces[p]) {
-        face_of_copy[v] = polygon_faces[p];
-        copy[v] = static_cast<Index>(mesh.positions.size());
-        mesh.positions.push_back(mesh.positions[v]);
-      }
-      mesh.face_vertices[k] = copy[v];
+      const auto [at, is_new] = copies.try_emplace({v, keys[p]}, static_cast<Index>(mesh.positions.size()));
+      if (is_new) mesh.positions.push_back(mesh.positions[v]);
+      mesh.face_vertices[k] = at->second;
     }
 }
 
@@ -77,6 +78,17 @@ std::vector<double> at_vertices(const PolygonMesh& mesh, const std::vector<Index
     for (std::size_t k = mesh.face_offsets[p]; k < mesh.face_offsets[p + 1]; ++k)
       values[mesh.face_vertices[k]] = std::min(values[mesh.face_vertices[k]], face_values[polygon_faces[p]]);
   return values;
+}
+
+/// A shade per vertex that tells regions apart, evenly spaced in [0, 1].
+std::vector<double> region_shades(const PolygonMesh& mesh, const std::vector<Index>& region_of_polygon,
+                                  std::size_t num_regions) {
+  std::vector<double> shades(mesh.positions.size(), 1);
+  for (std::size_t p = 0; p < mesh.num_faces(); ++p)
+    for (std::size_t k = mesh.face_offsets[p]; k < mesh.face_offsets[p + 1]; ++k)
+      shades[mesh.face_vertices[k]] =
+          (static_cast<double>(region_of_polygon[p]) + 0.5) / static_cast<double>(num_regions);
+  return shades;
 }
 
 /// The edges of faces that are not among `drawn` yet.
@@ -100,16 +112,20 @@ int intervals_of(const ElementSpace& space) {
 }  // namespace
 
 Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane,
-                    const SurfaceSceneOptions& options) {
+                    const SurfaceSceneOptions& options, const CellRegions& regions) {
   const MeshTopology& topology = mesh.space.topology();
   if (mesh.space.num_cells() == 0) throw InputError("cutaway: expected a mesh with cells");
   if (cell_minima.size() != mesh.space.num_cells()) throw InputError("cell_minima: expected one value per cell");
   if (plane.axis < CutPlane::kShortest || plane.axis > 2) throw InputError("CutPlane::axis: expected 0, 1 or 2");
   if (!(plane.share > 0 && plane.share < 1)) throw InputError("CutPlane::share: expected a number between 0 and 1");
+  const bool shows_regions = regions.regions.size() > 1;
+  if (shows_regions && regions.of_cell.size() != mesh.space.num_cells())
+    throw InputError("CellRegions::of_cell: expected one region per cell");
 
   const std::vector<char> kept = kept_cells(mesh, plane);
   std::array<SeenFaces, 2> seen;  // of the surface and of the cut
   std::vector<double> face_quality(topology.num_faces(), 1);
+  std::vector<Index> face_region(topology.num_faces(), 0);
   for (std::size_t i = 0; i < topology.num_faces(); ++i) {
     const auto f = static_cast<Index>(i);
     const auto [first, second] = topology.face_cells(f);
@@ -119,6 +135,7 @@ Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
     list.faces.push_back(f);
     list.cells.push_back(has_first ? first : second);
     face_quality[i] = cell_minima[list.cells.back()];
+    if (shows_regions) face_region[i] = regions.of_cell[list.cells.back()];
   }
 
   std::vector<SceneSheet> sheets;
@@ -132,17 +149,26 @@ Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
     SceneSheet& sheet = sheets.emplace_back();
     sheet.name = name;
     sheet.mesh = polygons_of(samples, mesh, faces);
-    if (is_cut) part_faces(sheet.mesh, samples.triangle_faces);
+    std::vector<Index> region_of_polygon;
+    for (const Index f : samples.triangle_faces) region_of_polygon.push_back(face_region[f]);
+    if (is_cut)
+      part(sheet.mesh, samples.triangle_faces);
+    else if (shows_regions)
+      part(sheet.mesh, region_of_polygon);
     sheet.shades = at_vertices(sheet.mesh, samples.triangle_faces, face_quality);
     sheet.attribute = {"_SCALED_JACOBIAN", sheet.shades};
     sheet.wires = samples.crease_edges;
+    if (!shows_regions) continue;
+    sheet.shades = region_shades(sheet.mesh, region_of_polygon, regions.regions.size());
+    sheet.mesh.face_groups = {regions.regions, std::move(region_of_polygon)};
   }
-  return sheet_scene(sheets, kQualityColorMap, options);
+  return sheet_scene(sheets, shows_regions ? kRegionColorMap : kQualityColorMap, options);
 }
 
 Scene cutaway_scene(const VolumeMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane,
-                    const SurfaceSceneOptions& options) {
-  return cutaway_scene(HighOrderMesh(ElementSpace(mesh, Basis::legendre, 1), mesh), cell_minima, plane, options);
+                    const SurfaceSceneOptions& options, const CellRegions& regions) {
+  return cutaway_scene(HighOrderMesh(ElementSpace(mesh, Basis::legendre, 1), mesh), cell_minima, plane, options,
+                       regions);
 }
 
 }  // namespace subvol

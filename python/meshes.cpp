@@ -437,6 +437,19 @@ SurfaceMesh surface_from(const py::object& object, const char* name) {
   });
 }
 
+SurfaceMesh shell_surface_from(const py::object& object, const char* name, std::string& region) {
+  if (region.empty()) return surface_from(object, name);
+  if (py::isinstance<VolumeMesh>(object)) {
+    const auto& mesh = object.cast<const VolumeMesh&>();
+    require_finite(mesh.positions, name);
+    return cli::tagged_polygons(cli::cells_of_region(mesh, std::exchange(region, {})));
+  }
+  if (!is_path(object)) return surface_from(object, name);
+  return read_with_warnings([&, path = path_from(object)](std::vector<std::string>& warnings) {
+    return cli::load_shell_surface(path, region, warnings);
+  });
+}
+
 void add_meshes(py::module_& module) {
   for (const auto& [kind, plural] : kKinds) {
     std::string name = cell_topology(kind).name;

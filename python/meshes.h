@@ -43,6 +43,9 @@ std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, co
 /// A surface, or the boundary of a volume mesh: as triangles, or as polygons with tags. InputError: points not finite.
 TriangleMesh triangles_from(const py::object& object, const char* name);
 SurfaceMesh surface_from(const py::object& object, const char* name);
+/// Returns the surface on which a shell grows. Of cells, that is the boundary of a region, which is given by its name
+/// or number; `region` is empty afterwards. ValueError: there is no such region.
+SurfaceMesh shell_surface_from(const py::object& object, const char* name, std::string& region);
 /// A surface as above, or points: an (n, 3) array, or the path of a file of them. InputError also as `sound_points`.
 cli::Target target_from(const py::object& object, const char* name);
 /// Converts the target of a fit in the same way; of a volume mesh, also the interfaces between its regions.

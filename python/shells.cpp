@@ -29,7 +29,7 @@ class Growing {
   Growing(const py::object& surface, const py::object& thickness, const py::kwargs& given)
       : keywords_("shell", given), work_(keywords_) {
     read_options();
-    given_ = surface_from(surface, "surface");
+    given_ = shell_surface_from(surface, "surface", preparation_.region);
     const TriangleMesh triangles = triangulate(given_.polygons);
     diagonal_ = bounding_box_diagonal(triangles);
     inward_warning_ = cli::inward_warning(triangles);
@@ -50,6 +50,7 @@ class Growing {
     if (curved_options_.order != 1) curve(*result);
     std::vector<std::string> warnings = result->shell.report.warnings;
     if (const auto repaired = cli::repair_warning(surface_, diagonal_)) warnings.insert(warnings.begin(), *repaired);
+    if (surface_.note) warnings.insert(warnings.begin(), *surface_.note);
     if (inward_warning_) warnings.insert(warnings.begin(), *inward_warning_);
     result->report = make_report("shell", report_of(*result), keywords_, work_, warnings);
     return result;
@@ -62,9 +63,11 @@ class Growing {
     keywords_.take("growth", options_.growth);
     take_length("first_height", first_height_);
     take_length("repair", repair_);
+    take_length("region", preparation_.region);
     take_patches();
     keywords_.take("side", options_.side,
                    {{"outward", ShellSide::outward}, {"inward", ShellSide::inward}, {"both", ShellSide::both}});
+    preparation_.side = options_.side;
     keywords_.take("free_surface", options_.free_surface);
     keywords_.take("straight", straight);
     keywords_.take("crease_angle", crease_angle_);
@@ -95,7 +98,7 @@ class Growing {
     }
   }
 
-  /// Takes a length: a number, or text with a number or a percentage.
+  /// Takes a length or a name: a number, or text.
   void take_length(const char* name, std::string& text) {
     const py::object given = keywords_.object(name);
     if (!given.is_none()) text = py::str(given).cast<std::string>();
@@ -196,8 +199,8 @@ auto by_side(std::vector<double> ShellResult::* values) {
 
 constexpr const char* kShellHelp =
     R"(shell(surface, thickness, *, layers=1, growth=1.0, side='outward', free_surface=False, straight=False,
-    crease_angle=None, first_height=None, skip=None, repair='0.02%', order=1, basis='legendre', max_iterations=0, time_limit=0.0, chord=0.005, progress=None,
-    threads=None)
+    crease_angle=None, first_height=None, region=None, skip=None, repair='0.02%', order=1, basis='legendre',
+    max_iterations=0, time_limit=0.0, chord=0.005, progress=None, threads=None)
 --
 
 Grows layers of prisms on triangles and of hexes on quads: ShellResult.
@@ -208,6 +211,8 @@ layers        on each side
 growth        thickness of a layer against that of the one nearer the surface
 first_height  thickness of the layer at the surface, as text: a length, or '2%': the growth follows from layers, or the
               layers from growth
+region        grow on the boundary of this region of the surface or of the cells: its name or number; None: on the
+              outer surface
 skip          list of patches without layers: names or numbers of groups, or points 'X,Y,Z' on patches between sharp edges
 repair        faults of the surface are repaired by changes within this distance, as text: a length, or '2%'; '0': none
 side          'outward' where the faces' normals point, 'inward', or 'both'

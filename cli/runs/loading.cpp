@@ -111,19 +111,6 @@ Content cells_in(const std::filesystem::path& path, std::vector<std::string>& wa
 
 constexpr int kCellDimension = 3;
 
-/// Returns the number of the region with this name or number. UsageError: there is none; it begins with `option`.
-int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option) {
-  std::string known;
-  for (const Group& region : regions) {
-    const std::string number = std::to_string(region.number);
-    if (name == number || name == region.name) return region.number;
-    known += (known.empty() ? "" : ", ") + number;
-    if (!region.name.empty()) known += " (" + region.name + ")";
-  }
-  throw UsageError(option + ": there is no region " + in_quotes(name) + "; there " +
-                   (regions.empty() ? "is only one" : "are " + known));
-}
-
 }  // namespace
 
 bool is_surface_file(const std::filesystem::path& path) {
@@ -185,6 +172,12 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
   refuse_curved(path, "a surface is wanted");
 }
 
+TaggedPolygons load_shell_surface(const std::filesystem::path& path, std::string& region,
+                                  std::vector<std::string>& warnings) {
+  if (region.empty() || is_surface_file(path)) return load_tagged_polygons(path, warnings);
+  return tagged_polygons(cells_of_region(load_volume(path, warnings), std::exchange(region, {})));
+}
+
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   std::vector<Index> volume_vertex;
@@ -233,6 +226,18 @@ std::vector<Group> regions_of(const VolumeMesh& mesh) {
   for (const int reference : region_references(mesh))
     regions.push_back({region_label(mesh, reference), reference, kCellDimension});
   return regions;
+}
+
+int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option) {
+  std::string known;
+  for (const Group& region : regions) {
+    const std::string number = std::to_string(region.number);
+    if (name == number || name == region.name) return region.number;
+    known += (known.empty() ? "" : ", ") + number;
+    if (!region.name.empty()) known += " (" + region.name + ")";
+  }
+  throw UsageError(option + ": there is no region " + in_quotes(name) + "; there " +
+                   (regions.empty() ? "is only one" : "are " + known));
 }
 
 void require_regions(std::span<const Output> outputs, std::span<const Group> regions) {

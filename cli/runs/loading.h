@@ -67,6 +67,10 @@ struct TaggedPolygons {
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
 /// `load_polygons` with the tags of a volume mesh; a surface file has none.
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// Loads the surface on which a shell grows. Of a mesh of cells, that is the boundary of a region, which is given by
+/// its name or number; `region` is empty afterwards. UsageError: there is no such region.
+TaggedPolygons load_shell_surface(const std::filesystem::path& path, std::string& region,
+                                  std::vector<std::string>& warnings);
 
 /// Value of --references with which cells are read without references, as one region.
 inline constexpr const char* kNoReferences = "none";
@@ -87,6 +91,10 @@ VolumeMesh labels_of(const HighOrderFile& file);
 
 /// Returns the regions of a mesh: their names and their references as numbers.
 std::vector<Group> regions_of(const VolumeMesh& mesh);
+
+/// Returns the number of the region with this name or number. UsageError: there is none; the message begins with
+/// `option` and lists the regions.
+int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option);
 
 /// UsageError: an output is the part of a region that is not among these; the message lists them.
 void require_regions(std::span<const Output> outputs, std::span<const Group> regions);

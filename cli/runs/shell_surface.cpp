@@ -7,8 +7,10 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/mesh/features.h"
 #include "subvol/shell/partial_surface.h"
+#include "subvol/shell/region_faces.h"
 #include "subvol/shell/shell_layers.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/region_surface.h"
 
 #include <Eigen/Geometry>
 
@@ -67,25 +69,64 @@ double area_of(const PolygonMesh& surface, const std::vector<char>& is_in) {
   return area;
 }
 
+/// Replaces numbers of the present surface by those that they had before.
+void renumber(const std::vector<Index>& numbers, std::vector<Index>& before) {
+  std::vector<Index> now;
+  for (const Index n : numbers) now.push_back(before.empty() ? n : before[n]);
+  before = std::move(now);
+}
+
+/// Leaves faces out of the surface.
+void take_part(PartialSurface part, ShellSurface& result) {
+  result.polygons = std::move(part.surface);
+  result.tags = std::move(part.tags);
+  result.border_planes = std::move(part.border_planes);
+  renumber(part.vertex_numbers, result.vertex_numbers);
+  renumber(part.face_numbers, result.face_numbers);
+}
+
+/// Leaves only the boundary of one region, or of all.
+void select_region(const ShellSurfaceOptions& options, ShellSurface& result) {
+  if (options.region.empty() && !has_inner_sheets(result.polygons)) return;
+  const std::optional<RegionSurface> regions = find_regions(triangulate(result.polygons));
+  if (!regions && options.region.empty()) return;  // the mending says what is wrong
+  const int number = options.region.empty() ? kOutside
+                                            : number_of_region(regions ? regions->regions : std::vector<Group>{},
+                                                               options.region, "--region");
+  if (number == kOutside && options.side != ShellSide::outward)
+    throw InputError("sheets divide the inside of the surface into " + std::to_string(regions->regions.size()) +
+                     " regions, and layers inward would cross them; give --region NAME to grow them in one");
+  RegionFaces faces = faces_of_region(result.polygons, *regions, number);
+  if (number == kOutside && faces.num_left_out > 0)
+    result.note = std::to_string(faces.num_left_out) + " faces between its " + std::to_string(regions->regions.size()) +
+                  " regions get no layers; with --region NAME, layers grow on the boundary of one region";
+  PartialSurface part = without_faces(faces.surface, result.tags, faces.is_left_out);
+  part.border_planes.clear();  // the boundary of a region has no rim
+  take_part(std::move(part), result);
+}
+
 }  // namespace
 
 ShellSurface prepared_surface(const TaggedPolygons& given, const ShellSurfaceOptions& options) {
-  ShellSurface result{.polygons = given.polygons, .tags = given.tags, .border_planes = {}, .vertex_numbers = {},
-                      .face_numbers = {}, .skipped = {}, .mended = {}, .repair_distance = options.repair_distance};
+  ShellSurface result{.polygons = given.polygons,
+                      .tags = given.tags,
+                      .border_planes = {},
+                      .vertex_numbers = {},
+                      .face_numbers = {},
+                      .skipped = {},
+                      .note = {},
+                      .mended = {},
+                      .repair_distance = options.repair_distance};
+  select_region(options, result);
   if (!options.skipped.empty()) {
-    std::vector<char> is_left_out(given.polygons.num_faces(), 0);
+    std::vector<char> is_left_out(result.polygons.num_faces(), 0);
     for (const std::string& name : options.skipped) {
-      const std::vector<char> patch = patch_named(given.polygons, name);
+      const std::vector<char> patch = patch_named(result.polygons, name);
       for (std::size_t f = 0; f < patch.size(); ++f) is_left_out[f] |= patch[f];
-      result.skipped.push_back({name, static_cast<std::size_t>(std::count(patch.begin(), patch.end(), 1)),
-                                area_of(given.polygons, patch)});
+      result.skipped.push_back(
+          {name, static_cast<std::size_t>(std::count(patch.begin(), patch.end(), 1)), area_of(result.polygons, patch)});
     }
-    PartialSurface part = without_faces(given.polygons, given.tags, is_left_out);
-    result.polygons = std::move(part.surface);
-    result.tags = std::move(part.tags);
-    result.border_planes = std::move(part.border_planes);
-    result.vertex_numbers = std::move(part.vertex_numbers);
-    result.face_numbers = std::move(part.face_numbers);
+    take_part(without_faces(result.polygons, result.tags, is_left_out), result);
   }
   MendedSurface mended =
       mend_surface(result.polygons, result.tags, options.repair_distance, MendingGoal::layers, options.cancelled);
@@ -98,13 +139,8 @@ ShellSurface prepared_surface(const TaggedPolygons& given, const ShellSurfaceOpt
           vertices.push_back(static_cast<Index>(v));
       plane.vertices = std::move(vertices);
     }
-    const auto through = [](const std::vector<Index>& numbers, std::vector<Index>& before) {
-      std::vector<Index> now;
-      for (const Index n : numbers) now.push_back(before.empty() ? n : before[n]);
-      before = std::move(now);
-    };
-    through(mended.vertex_numbers, result.vertex_numbers);
-    through(mended.face_numbers, result.face_numbers);
+    renumber(mended.vertex_numbers, result.vertex_numbers);
+    renumber(mended.face_numbers, result.face_numbers);
     result.polygons = std::move(mended.surface);
     result.tags = std::move(mended.tags);
   }

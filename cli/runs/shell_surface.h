@@ -17,6 +17,8 @@ namespace subvol::cli {
 
 /// How the surface of a shell is prepared.
 struct ShellSurfaceOptions {
+  std::string region;  ///< name or number of the region on whose boundary layers grow; empty: all regions
+  ShellSide side = ShellSide::outward;
   std::vector<std::string> skipped;  ///< patches to leave out, each by group or point (`prepared_surface`)
   double repair_distance = 0;        ///< of `mend_surface`, in the surface's unit; 0: it is taken as it is
   std::function<bool()> cancelled;   ///< as in `mend_surface`
@@ -36,12 +38,17 @@ struct ShellSurface {
   std::vector<BorderPlane> border_planes;
   std::vector<Index> vertex_numbers, face_numbers;  ///< those of the given surface; empty: the same
   std::vector<SkippedPatch> skipped;
+  std::optional<std::string> note;                  ///< a sentence about faces between regions that were left out
   MendedSurface mended;                             ///< its counts and distance only
   double repair_distance = 0;                       ///< that was allowed
   bool is_cancelled = false;
 };
 
-/// Leaves patches out of a surface and mends the rest.
+/// Selects the boundary of a region, leaves patches out and mends the rest.
+///
+/// If sheets divide the inside of the surface into regions and none is named, layers grow outward on the boundary of
+/// all regions together; InputError: they are to grow inward, where they would cross the sheets. UsageError: there is
+/// no such region; the message lists the regions.
 ///
 /// A patch is given by the name or the number of a group of faces, or as X,Y,Z: then it is the face closest to that
 /// point and all faces that are connected with it through edges of at most `kPatchDegrees`. UsageError: there is no

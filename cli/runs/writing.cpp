@@ -211,6 +211,15 @@ void write_region(const Output& output, const Mesh& mesh, const WritingOptions& 
   write_output(whole, cells_of_region(mesh, output.region), options);
 }
 
+/// Returns the regions of a mesh's cells.
+CellRegions cell_regions(const VolumeMesh& mesh) {
+  CellRegions result{regions_of(mesh), {}};
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    result.of_cell.push_back(static_cast<Index>(
+        std::ranges::lower_bound(result.regions, reference_of(mesh, c), {}, &Group::number) - result.regions.begin()));
+  return result;
+}
+
 }  // namespace
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
@@ -219,7 +228,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
   if (output.is_volume()) return write_cells(output, mesh, options);
   if (output.part == Part::cutaway)
     return write_scene(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
-                                                 scene_options(output, options)));
+                                                  scene_options(output, options), cell_regions(mesh)));
   if (output.is_scene()) return write_scene(output.path, boundary_scene(mesh, scene_options(output, options)));
   const TaggedPolygons boundary = tagged_polygons(mesh);
   write_polygons(output, boundary.polygons, boundary.tags, options);
@@ -240,7 +249,8 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
   const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
   const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
   if (output.part == Part::cutaway)
-    return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
+    return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options),
+                                                  cell_regions(labels_of(file))));
   if (output.is_scene())
     return write_scene(output.path, surface_scene(mesh, minima, grouped_scene_options(output, options, file.face_groups,
                                                                                       mesh.space.topology())));

@@ -37,7 +37,7 @@ struct ShellArguments {
   RunOptions run;
   WritingOptions writing;
   ShellOptions shell;
-  std::string surface, thickness, thickness_file, thickness_attribute, side = "outward", first_height;
+  std::string surface, thickness, thickness_file, thickness_attribute, side = "outward", first_height, region;
   std::vector<std::string> skipped;
   std::string repair = formatted("%.6g%%", 100 * kMendingShare);
   int order = 1;
@@ -45,6 +45,10 @@ struct ShellArguments {
   std::optional<double> crease_angle_degrees;
   bool straight = false;
 };
+
+ShellSide shell_side(const std::string& name) {
+  return name == "both" ? ShellSide::both : name == "inward" ? ShellSide::inward : ShellSide::outward;
+}
 
 /// One run of `shell`, from its input file to its output files.
 class ShellRun : public LongRun {
@@ -70,6 +74,7 @@ class ShellRun : public LongRun {
 
   const ShellArguments& arguments_;
   TaggedPolygons given_;
+  std::string region_;    ///< of `given_`, on whose boundary layers grow; empty: on all of it
   ShellSurface surface_;  ///< on which the layers grow
   double diagonal_ = 0;
   ShellResult result_;
@@ -81,7 +86,8 @@ class ShellRun : public LongRun {
 };
 
 void ShellRun::load() {
-  given_ = load_tagged_polygons(arguments_.surface, warnings_);
+  region_ = arguments_.region;
+  given_ = load_shell_surface(arguments_.surface, region_, warnings_);
   const TriangleMesh triangles = triangulate(given_.polygons);
   diagonal_ = bounding_box_diagonal(triangles);
   if (const auto warning = inward_warning(triangles)) warnings_.push_back(arguments_.surface + ": " + *warning);
@@ -90,12 +96,15 @@ void ShellRun::load() {
 
 void ShellRun::mend() {
   try {
-    surface_ = prepared_surface(given_, {.skipped = arguments_.skipped,
+    surface_ = prepared_surface(given_, {.region = region_,
+                                         .side = shell_side(arguments_.side),
+                                         .skipped = arguments_.skipped,
                                          .repair_distance = parse_repair("--repair", arguments_.repair, diagonal_),
                                          .cancelled = interrupted});
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
   }
+  if (surface_.note) add_warnings({arguments_.surface + ": " + *surface_.note});
   if (const auto warning = repair_warning(surface_, diagonal_)) add_warnings({arguments_.surface + ": " + *warning});
 }
 
@@ -124,9 +133,7 @@ void ShellRun::grow() {
     options.thickness = parse_length("--thickness", arguments_.thickness, diagonal_);
   else
     options.vertex_thickness = arguments_.thickness_file.empty() ? thickness_from_attribute() : thickness_from_file();
-  options.side = arguments_.side == "both"     ? ShellSide::both
-                 : arguments_.side == "inward" ? ShellSide::inward
-                                               : ShellSide::outward;
+  options.side = shell_side(arguments_.side);
   options.optimize = !arguments_.straight;
   if (!arguments_.first_height.empty()) plan_layers(options);
   try {
@@ -326,6 +333,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Thickness of the layer at the surface, as a length or 2%: the growth follows from --layers, or the\n"
                   "layers from --growth")
       ->type_name("H");
+  verb.add_option("--region", arguments.region,
+                  "Grow on the boundary of this region of SURFACE, which may be a mesh of cells: its name or number\n"
+                  "(default: on the outer surface)")
+      ->type_name("NAME");
   verb.add_option(
           "--skip", arguments.skipped,
           "Patch of SURFACE without layers: a group's name or number, or a point X,Y,Z on a patch between sharp\n"

@@ -29,7 +29,7 @@ namespace {
 struct SubdivideArguments {
   RunOptions run;
   WritingOptions writing;
-  std::string mesh, boundary = "catmull-clark";
+  std::string mesh, boundary = "auto";
   int levels = 1;
   std::optional<double> crease_angle_degrees;
 };
@@ -41,6 +41,19 @@ void warn_of_volumes(const VolumeMesh& cage, const VolumeMesh& fine, std::vector
        warnings_of_volumes(measure_regions(fine, nullptr), measure_regions(cage, nullptr), "control mesh"))
     warnings.push_back(warning +
                        "; creases (--crease-angle) keep the shape of edges, --boundary linear that of all faces");
+}
+
+/// Returns the rule that --boundary stands for. Meshes of several regions without creases are meshes to compute on,
+/// rather than cages: rounding would change the volumes of materials.
+std::string boundary_rule(const SubdivideArguments& arguments, const VolumeMesh& cage,
+                          std::vector<std::string>& warnings) {
+  if (arguments.boundary != "auto") return arguments.boundary;
+  if (region_references(cage).size() < 2 || !cage.tags.empty() || arguments.crease_angle_degrees)
+    return "catmull-clark";
+  warnings.push_back(
+      "cells of several references, and no creases: cells are only split, so that regions keep their shape; "
+      "--boundary catmull-clark rounds the boundary and the interfaces");
+  return "linear";
 }
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
@@ -56,8 +69,9 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
   }
-  const bool has_limit = arguments.boundary == "catmull-clark";  // the others converge to other surfaces
-  const VolumeMesh fine = arguments.boundary == "linear"
+  const std::string rule = boundary_rule(arguments, cage, warnings);
+  const bool has_limit = rule == "catmull-clark";  // the others converge to other surfaces
+  const VolumeMesh fine = rule == "linear"
                               ? split_repeatedly(cage, arguments.levels)
                               : subdivide_repeatedly(cage, arguments.levels,
                                                      has_limit ? BoundaryRule::catmull_clark : BoundaryRule::averaging);
@@ -95,9 +109,10 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->type_name("L")
       ->capture_default_str();
   verb->add_option("--boundary", arguments->boundary,
-                   "How boundary vertices are subdivided; linear: cells are only split, and no vertex moves")
-      ->check(CLI::IsMember({"catmull-clark", "averaging", "linear"}))
-      ->type_name("catmull-clark|averaging|linear")
+                   "How boundary vertices are subdivided; linear: cells are only split, and no vertex moves; auto:\n"
+                   "linear for cells of several references without creases, else catmull-clark")
+      ->check(CLI::IsMember({"auto", "catmull-clark", "averaging", "linear"}))
+      ->type_name("auto|catmull-clark|averaging|linear")
       ->capture_default_str();
   verb->add_option("--crease-angle", arguments->crease_angle_degrees,
                    "Boundary edges sharper than this become creases (default: only those the file tags)")

@@ -330,6 +330,7 @@ def shell(
     straight: bool = False,
     crease_angle: Optional[float] = None,
     first_height: Optional[Union[float, str]] = None,
+    region: Optional[Union[int, str]] = None,
     skip: Optional[Union[int, str, Sequence[Union[int, str]]]] = None,
     repair: Union[float, str] = "0.02%",
     order: int = 1,

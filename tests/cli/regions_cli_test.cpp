@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes of several regions, as their users run them through the verbs.
 
+#include "subvol/export/surface_writer.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/surface/boundary.h"
+#include "tests/support/region_fixtures.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
 
@@ -54,10 +57,16 @@ TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions][slo
   CHECK(check.out.find("interface           between 3 and 8: 4 faces, area 4") != std::string::npos);
 }
 
-TEST_CASE("subdivide warns of regions that lose volume", "[cli][regions]") {
+TEST_CASE("subdivide keeps the shape of regions without creases, and warns of those that lose volume",
+          "[cli][regions]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());
-  const Run rounded = place.run("subdivide layers.mesh -o out.mesh --force");
+  const Run kept = place.run("subdivide layers.mesh -o out.mesh --report r.json");
+  CHECK(kept.status == 0);
+  CHECK_THAT(kept.err, Catch::Contains("cells are only split") && Catch::Contains("--boundary catmull-clark"));
+  const auto report = nlohmann::json::parse(content_of(place / "r.json"));
+  CHECK(report.at("regions").at("cells")[0].at("volume").get<double>() == Approx(8));
+  const Run rounded = place.run("subdivide layers.mesh --boundary catmull-clark -o out.mesh --force");
   CHECK(rounded.status == 0);
   CHECK_THAT(rounded.err, Catch::Contains("the volume of region 3 is") &&
                               Catch::Contains("in the control mesh it is 8") &&
@@ -70,8 +79,7 @@ TEST_CASE("subdivide warns of regions that lose volume", "[cli][regions]") {
   }
 }
 
-TEST_CASE("convert writes one region, and lists the regions if there is no such one",
-          "[cli][regions]") {
+TEST_CASE("convert writes one region, and lists the regions if there is no such one", "[cli][regions]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());
   REQUIRE(place.run("convert layers.mesh --region 8 -o core.mesh").status == 0);
@@ -112,4 +120,26 @@ TEST_CASE("merge keeps regions of two meshes apart and warns of numbers and name
   REQUIRE(same.status == 0);
   CHECK(same.err.find("both meshes have the region steel") != std::string::npos);
   CHECK(subvol::read_volume_mesh(place / "both.mesh").references == std::vector<int>{1, 1});
+}
+
+TEST_CASE("shell grows layers on the outer surface of regions, or on the boundary of one of them",
+          "[cli][regions][shell]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "layers.mesh", two_layers());
+  const subvol::TriangleMesh slabs = subvol::test::slabs_surface(2);
+  subvol::write_surface(place / "slabs.stl", subvol::as_polygons(slabs));
+  const Run outer = place.run("shell slabs.stl --thickness 0.05 -o shell.vtu");
+  CHECK(outer.status == 0);
+  CHECK_THAT(outer.err, Catch::Contains("2 faces between its 2 regions get no layers") && Catch::Contains("--region"));
+  const Run inward = place.run("shell slabs.stl --thickness 0.05 --side inward -o no.vtu");
+  CHECK(inward.status == 3);
+  CHECK_THAT(inward.err, Catch::Contains("2 regions") && Catch::Contains("--region NAME"));
+  for (const char* file : {"slabs.stl", "layers.mesh"}) {
+    const std::string region = file[0] == 's' ? "2" : "8";
+    const std::string words =
+        "shell " + std::string(file) + " --thickness 0.05 --side inward --force -o in.vtu --region ";
+    CAPTURE(file);
+    CHECK(place.run(words + region).status == 0);
+    CHECK(place.run(words + "7").status == 2);
+  }
 }

@@ -2,6 +2,7 @@
 #include "subvol/export/cutaway.h"
 
 #include "subvol/base/error.h"
+#include "subvol/export/color_map.h"
 #include "subvol/export/gltf_writer.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/quality.h"
@@ -118,6 +119,28 @@ TEST_CASE("cut faces have the colour of their own cell, the surface the least ar
   for (const auto& [value, count] : times) CHECK(count == 4);
   const auto& least = scene.nodes[0].primitive.attributes.at(0).values;
   CHECK(*std::min_element(least.begin(), least.end()) == 0);
+}
+
+TEST_CASE("a cutaway of several regions has a part and a color for each, and keeps the quality") {
+  const VolumeMesh mesh = lattice(2, 3, 2);
+  CellRegions regions{{{"core", 3, 3}, {"shell", 8, 3}}, {}};
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) regions.of_cell.push_back(static_cast<Index>(c % 2));  // by x
+  const std::vector<double> minima(mesh.num_cells(), 0.5);
+  const Scene scene = cutaway_scene(mesh, minima, {.axis = 2}, {}, regions);
+  REQUIRE(scene.nodes.size() == 3);
+  for (std::size_t n : {0, 1}) {
+    const ScenePrimitive& primitive = scene.nodes[n].primitive;
+    REQUIRE(primitive.parts.size() == 2);
+    CHECK(primitive.parts[0].name == "core");
+    CHECK(primitive.parts[1].name == "shell");
+    CHECK(primitive.parts[1].number == 8);
+    for (const ScenePart& part : primitive.parts)
+      for (std::size_t i = part.first; i < part.first + part.size; ++i)
+        CHECK(primitive.colors[primitive.indices[i]] == quality_color(part.number == 3 ? 0.25 : 0.75));
+    for (const double value : primitive.attributes.at(0).values) CHECK(value == 0.5);
+  }
+  regions.of_cell.pop_back();
+  CHECK_THROWS_AS(cutaway_scene(mesh, minima, {}, {}, regions), InputError);
 }
 
 TEST_CASE("cutaways of cells of every kind, straight and curved, are files without fault") {

@@ -146,6 +146,14 @@ class Shells(InFolder):
             report = subvol.shell(turned, 0.1, straight=True).report
         self.assertTrue(any("point inward" in warning for warning in report["warnings"]))
 
+    def test_a_shell_of_one_region(self):
+        grid = subvol.template.grid(box=(0, 0, 0, 2, 1, 1), counts=(2, 1, 1))
+        two = subvol.VolumeMesh(grid.points, hexes=grid.hexes, references=[3, 8])
+        result = subvol.shell(two, 0.1, region=8, side="inward")
+        self.assertEqual(len(result.surface.quads), 6)
+        with self.assertRaisesRegex(ValueError, "region"):
+            subvol.shell(two, 0.1, region=7)
+
     def test_a_curved_shell(self):
         surface = cube().boundary()
         result = subvol.shell(surface, np.full(8, 0.1), order=2)

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/shell/region_faces.h"
+
+#include "subvol/surface/boundary.h"
+#include "subvol/surface/triangle_geometry.h"
+#include "tests/support/region_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+using namespace subvol;
+using namespace subvol::internal;
+
+namespace {
+
+double enclosed_volume(const PolygonMesh& surface, const std::vector<char>& is_left_out) {
+  std::vector<Index> face;
+  const TriangleMesh mesh = triangulate(surface, &face);
+  double sum = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (is_left_out[face[t]]) continue;
+    const auto& [a, b, c] = mesh.triangles[t];
+    sum += mesh.positions[a].dot(mesh.positions[b].cross(mesh.positions[c])) / 6;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("faces of a region close it and face outward, whatever way the given ones face", "[shell][regions]") {
+  TriangleMesh slabs = test::slabs_surface(3);
+  for (std::size_t t = 0; t < slabs.triangles.size(); t += 3) std::swap(slabs.triangles[t][1], slabs.triangles[t][2]);
+  const PolygonMesh surface = as_polygons(slabs);
+  CHECK(has_inner_sheets(surface));
+  const auto regions = find_regions(slabs);
+  REQUIRE(regions);
+  for (const Group& region : regions->regions) {
+    const RegionFaces faces = faces_of_region(surface, *regions, region.number);
+    CHECK(enclosed_volume(faces.surface, faces.is_left_out) == Approx(1.0 / 3));
+    CHECK(faces.num_left_out == surface.num_faces() - 12);
+  }
+  const RegionFaces outer = faces_of_region(surface, *regions, kOutside);
+  CHECK(enclosed_volume(outer.surface, outer.is_left_out) == Approx(1));
+  CHECK(outer.num_left_out == 4);
+}
+
+TEST_CASE("of two faces in one place, a region has one", "[shell][regions]") {
+  const TriangleMesh two =
+      test::together(test::box_surface({0, 0, 0}, {1, 1, 1}), test::box_surface({1, 0, 0}, {2, 1, 1}));
+  const auto regions = find_regions(two);
+  REQUIRE(regions);
+  const PolygonMesh surface = as_polygons(two);
+  for (const Group& region : regions->regions) {
+    const RegionFaces faces = faces_of_region(surface, *regions, region.number);
+    CHECK(enclosed_volume(faces.surface, faces.is_left_out) == Approx(1));
+  }
+  CHECK(!has_inner_sheets(as_polygons(test::ball_surface({0, 0, 0}, 1, 4))));
+}
