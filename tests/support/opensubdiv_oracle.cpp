@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/support/opensubdiv_oracle.h"
 
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <Eigen/Geometry>
@@ -9,6 +10,8 @@
 #include <opensubdiv/far/topologyDescriptor.h>
 #include <opensubdiv/far/topologyRefinerFactory.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 
 namespace subvol::test {
@@ -30,21 +33,30 @@ struct Boundary {
   std::unique_ptr<osd::Far::TopologyRefiner> refiner;
 };
 
-Boundary make_boundary(const VolumeMesh& mesh) {
+Boundary make_boundary(const VolumeMesh& mesh, OracleFaces which = OracleFaces::boundary) {
   const MeshTopology topology(mesh);
   Boundary boundary;
+  std::vector<std::vector<Index>> faces;
+  for (const Index f : topology.boundary_faces()) faces.emplace_back(topology.face(f).begin(), topology.face(f).end());
+  if (which == OracleFaces::sheets)
+    for (const Index f : internal::find_interfaces(mesh, topology).faces) {
+      const std::array<Index, 4> face = internal::oriented_face(mesh, topology, f);
+      faces.emplace_back(face.begin(), std::ranges::find(face, kNoIndex));
+    }
   std::vector<Index> numbers(mesh.num_vertices(), kNoIndex);
+  for (const auto& face : faces)
+    for (const Index v : face) numbers[v] = 0;
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
-    if (topology.is_boundary_vertex(static_cast<Index>(v))) {
+    if (numbers[v] != kNoIndex) {
       numbers[v] = static_cast<Index>(boundary.vertices.size());
       boundary.vertices.push_back(static_cast<Index>(v));
       boundary.points.push_back({mesh.positions[v]});
     }
   std::vector<int> sizes, corners, crease_pairs, corner_indices;
   std::vector<float> crease_weights, corner_weights;
-  for (Index f : topology.boundary_faces()) {
-    sizes.push_back(static_cast<int>(topology.face(f).size()));
-    for (Index v : topology.face(f)) corners.push_back(numbers[v]);
+  for (const auto& face : faces) {
+    sizes.push_back(static_cast<int>(face.size()));
+    for (const Index v : face) corners.push_back(numbers[v]);
   }
   for (const CreaseEdge& crease : mesh.tags.creases) {
     crease_pairs.insert(crease_pairs.end(), {numbers[crease.v0], numbers[crease.v1]});
@@ -108,8 +120,8 @@ OracleLevels oracle_refine(const VolumeMesh& mesh, int levels) {
   return result;
 }
 
-OracleChildren oracle_children(const VolumeMesh& mesh) {
-  Boundary boundary = make_boundary(mesh);
+OracleChildren oracle_children(const VolumeMesh& mesh, OracleFaces faces) {
+  Boundary boundary = make_boundary(mesh, faces);
   const auto points = refine(boundary, 1);
   const auto& coarse = boundary.refiner->GetLevel(0);
   OracleChildren children;

@@ -15,12 +15,14 @@ struct OracleLevels {
 };
 OracleLevels oracle_refine(const VolumeMesh& mesh, int levels);
 
-/// OpenSubdiv's positions of the children of the first refinement.
+/// OpenSubdiv's positions of the children of the first refinement of the boundary, or of all sheets as one non-manifold
+/// surface.
 struct OracleChildren {
-  std::vector<Index> vertices;                     ///< volume vertex of each boundary vertex
+  std::vector<Index> vertices;                     ///< volume vertex of each vertex of the surface
   std::vector<std::array<Index, 2>> edges;         ///< its edges, by volume vertices, smaller first
   std::vector<Vec3> vertex_children, edge_children;
 };
-OracleChildren oracle_children(const VolumeMesh& mesh);
+enum class OracleFaces { boundary, sheets };
+OracleChildren oracle_children(const VolumeMesh& mesh, OracleFaces faces = OracleFaces::boundary);
 
 }  // namespace subvol::test

@@ -7,6 +7,7 @@
 #include "subvol/subdivision/repeated_subdivision.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/sheets.h"
+#include "tests/support/opensubdiv_oracle.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
@@ -178,6 +179,28 @@ TEST_CASE("interfaces are averaged on themselves by the rules of the boundary", 
     CHECK(distance_from_direct(mesh) <= kRegionRounding);
     CHECK(distance_from_direct(subdivide(mesh).fine) <= kRegionRounding);
   }
+}
+
+TEST_CASE("OpenSubdiv refines all sheets as one non-manifold surface in the same way", "[regions]") {
+  for (VolumeMesh mesh : meshes_of_regions())
+    for (const bool creased : {false, true}) {
+      if (creased) mesh.tags = features_by_angle(mesh, 40);
+      const OracleChildren oracle = oracle_children(mesh, OracleFaces::sheets);
+      const MeshTopology topology(mesh);
+      const SubdivisionLevel level = subdivide(mesh);
+      CAPTURE(mesh.num_cells(), creased);
+      double farthest = 0;
+      const auto compare = [&](std::size_t child, const Vec3& expected) {
+        farthest = std::max(farthest, (level.fine.positions[child] - expected).norm());
+      };
+      for (std::size_t i = 0; i < oracle.vertices.size(); ++i)
+        compare(static_cast<std::size_t>(oracle.vertices[i]), oracle.vertex_children[i]);
+      for (std::size_t e = 0; e < oracle.edges.size(); ++e) {
+        const Index edge = topology.find_edge(oracle.edges[e][0], oracle.edges[e][1]);
+        compare(mesh.num_vertices() + static_cast<std::size_t>(edge), oracle.edge_children[e]);
+      }
+      CHECK(farthest <= kRegionRounding);
+    }
 }
 
 TEST_CASE("rows of meshes with regions sum to one, are not negative and use the vertices of their sheet", "[regions]") {
