@@ -59,6 +59,7 @@ class HighOrderFit : HighOrderDriver {
   HighOrderFitResult run_from(const HighOrderMesh& start);
 
  private:
+  void keep_curved_interfaces();
   template <class Work>
   HighOrderFitResult concluded(const Work& work);
   void begin_try(const HighOrderTry& attempt);
@@ -353,9 +354,27 @@ HighOrderFitResult HighOrderFit::run() {
   });
 }
 
+/// Makes the present interfaces part of the target, unless it has some of its own.
+void HighOrderFit::keep_curved_interfaces() {
+  constexpr int kIntervalsPerOrder = 4;  // chords of a part of an edge are then closer than the fit is
+  if (order_ == 1) return;
+  const std::vector<Index> groups = groups_of_sheets(template_, mesh_.space.topology());
+  const BoundarySamples samples = make_sheet_samples(mesh_.space, template_, kIntervalsPerOrder * order_);
+  TriangleMesh interfaces{samples.positions.apply(mesh_.coefficients), {}};
+  std::vector<Index> group_of_triangle;
+  for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
+    const Index face = samples.triangle_faces[t];
+    if (mesh_.space.topology().is_boundary_face(face)) continue;
+    interfaces.triangles.push_back(samples.triangles[t]);
+    group_of_triangle.push_back(groups[face]);
+  }
+  if (!interfaces.triangles.empty()) target_.keep_interfaces(std::move(interfaces), std::move(group_of_triangle));
+}
+
 HighOrderFitResult HighOrderFit::run_from(const HighOrderMesh& start) {
   mesh_ = in_unit(start);
   set_orders(mesh_.space.orders());
+  keep_curved_interfaces();
   look_over_template();
   EntityOrders orders = mesh_.space.orders();
   for (std::vector<int>* of_entities : {&orders.edges, &orders.faces, &orders.cells})
@@ -394,13 +413,24 @@ HighOrderFitResult HighOrderFit::concluded(const Work& work) {
 
 }  // namespace
 
-HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
-                                  const HighOrderFitOptions& options) {
-  const MatchedTarget matched = matched_target(target, template_mesh);
-  if (matched.regions) return HighOrderFit(FitTarget(*matched.regions), template_mesh, options).run();
-  auto result = HighOrderFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
+namespace {
+
+/// Fits cells to a target, with its interfaces if they have the same regions. fit: does so for one target.
+template <class Fit>
+HighOrderFitResult fit_matched(const TriangleMesh& target, const VolumeMesh& cells, const Fit& fit) {
+  const MatchedTarget matched = matched_target(target, cells);
+  if (matched.regions) return fit(FitTarget(*matched.regions));
+  HighOrderFitResult result = fit(FitTarget(matched.outer ? *matched.outer : target));
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
   return result;
+}
+
+}  // namespace
+
+HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                                  const HighOrderFitOptions& options) {
+  return fit_matched(target, template_mesh,
+                     [&](FitTarget matched) { return HighOrderFit(std::move(matched), template_mesh, options).run(); });
 }
 
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMesh& start, const VolumeMesh& labels,
@@ -410,15 +440,13 @@ HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMes
     throw InputError("fit_high_order: the labels belong to other cells");
   cells.references = labels.references;
   cells.regions = labels.regions;
-  if (region_references(cells).size() > 1)
-    throw InputError(
-        "curved cells of several regions are not drawn to a target: their interfaces would not keep their "
-        "shape; without a target they do");
   cells.tags = labels.tags;
   cells.face_groups = labels.face_groups;
   HighOrderFitOptions options = given;
   options.basis = start.space.basis();
-  return HighOrderFit(FitTarget(target), cells, options).run_from(start);
+  return fit_matched(target, cells, [&](FitTarget matched) {
+    return HighOrderFit(std::move(matched), cells, options).run_from(start);
+  });
 }
 
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,

@@ -82,7 +82,9 @@ HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& 
 /// start    of hexes, prisms and tets, close to the target; its basis is that of the result (`basis` is ignored), and
 ///          `adaptive` is, too. Its cells should be certified (`optimize_curved`).
 /// labels   the same cells with their references, groups and tags; its positions are not read.
-/// InputError: as above; other cells in `labels`; several regions, whose curved interfaces cannot be kept.
+///          Interfaces between its regions are fitted to those of the target if it has the same regions, otherwise to
+///          themselves, as curved as they are.
+/// InputError: as above; other cells in `labels`.
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMesh& start, const VolumeMesh& labels,
                                   const HighOrderFitOptions& options);
 

@@ -27,10 +27,11 @@ FollowedCreases creases_along_target(const FitTarget& target, const CreaseRule& 
 void keep_interfaces(const CreaseRule& rule, FitTarget& target, FollowedCreases& creases, VolumeMesh& template_mesh,
                      FitReport& report) {
   using InnerCurves = FollowedCreases::InnerCurves;
+  const bool has_own = target.has_interfaces();
   target.keep_interfaces(template_mesh);
   if (target.has_interfaces())
     creases.keep_interfaces(template_mesh, rule.angle_degrees.value_or(kUsualCreaseAngle),
-                            target.region_triangle.empty() ? InnerCurves::themselves : InnerCurves::nothing);
+                            has_own ? InnerCurves::nothing : InnerCurves::themselves);
   else if (region_references(template_mesh).size() > 1)
     report.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
 }

@@ -23,8 +23,8 @@ struct CreaseRule {
 /// those of its own creases are followed that lie along sharp edges. Returns no creases if the target is a cloud.
 FollowedCreases creases_along_target(const FitTarget& target, const CreaseRule& rule, VolumeMesh& template_mesh);
 
-/// Makes the interfaces between the template's regions follow those of the target, or keep their own shape, sharp edges
-/// included. If the target is a cloud, adds a warning to the report that they are not kept.
+/// Makes the interfaces between the template's regions follow those that the target has, or keep their own shape, sharp
+/// edges included. If the target is a cloud, adds a warning to the report that they are not kept.
 void keep_interfaces(const CreaseRule& rule, FitTarget& target, FollowedCreases& creases, VolumeMesh& template_mesh,
                      FitReport& report);
 

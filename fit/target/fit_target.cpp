@@ -78,9 +78,16 @@ void FitTarget::keep_interfaces(const VolumeMesh& start) {
   const MeshTopology topology(start);
   const Interfaces found = find_interfaces(start, topology);
   if (found.empty()) return;
-  std::vector<Index> face_of_triangle;
-  interfaces = fan_triangles(interface_surface(start, topology, found), &face_of_triangle);
-  for (const Index f : face_of_triangle) group_of_interface_triangle.push_back(1 + found.pair_of_face[f]);
+  std::vector<Index> face_of_triangle, groups;
+  TriangleMesh triangles = fan_triangles(interface_surface(start, topology, found), &face_of_triangle);
+  for (const Index f : face_of_triangle) groups.push_back(1 + found.pair_of_face[f]);
+  keep_interfaces(std::move(triangles), std::move(groups));
+}
+
+void FitTarget::keep_interfaces(TriangleMesh triangles, std::vector<Index> groups) {
+  if (surface.is_cloud() || has_interfaces()) return;
+  interfaces = std::move(triangles);
+  group_of_interface_triangle = std::move(groups);
   add_interfaces();
 }
 

@@ -63,6 +63,9 @@ struct FitTarget {
   /// Makes the interfaces of a mesh, in normalized coordinates, part of the target; does nothing if there are none, or
   /// if the target is a cloud. `mesh`, `tree` and distances remain those of the target alone.
   void keep_interfaces(const VolumeMesh& start);
+  /// Likewise for triangles that stand for curved interfaces; groups: of each, as in `group_of_triangle`. Normals point
+  /// from the smaller to the larger reference.
+  void keep_interfaces(TriangleMesh triangles, std::vector<Index> groups);
   bool has_interfaces() const { return !interfaces.triangles.empty(); }
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
