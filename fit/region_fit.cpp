@@ -20,6 +20,7 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/auto_template.h"
 #include "subvol/templates/pillow.h"
 #include "subvol/templates/region_template.h"
@@ -27,6 +28,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -90,6 +93,26 @@ void RegionFit::find_curves() {
   if (follows_edges_) curves_ = sheet_curves(unit_, options_.crease_angle_degrees);
 }
 
+/// Says where more than three regions, the outside among them, meet along an edge of the target; empty if nowhere does.
+std::string crowded_curve(const RegionSurface& target) {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for_each_edge(sorted_half_edges(target.mesh.triangles, target.mesh.positions.size()),
+                [&](std::span<const SurfaceHalfEdge> edge) {
+                  if (!text.empty() || edge.size() <= kMost) return;
+                  std::set<int> regions;
+                  for (const SurfaceHalfEdge& side : edge)
+                    for (const int region : target.sides[static_cast<std::size_t>(side.triangle)])
+                      regions.insert(region);
+                  if (regions.size() <= kMost) return;
+                  const Vec3 middle = 0.5 * (target.mesh.positions[edge[0].low] + target.mesh.positions[edge[0].high]);
+                  text = formatted("; %zu regions meet along a curve through (%g, %g, %g), which a grid can follow only "
+                                   "in planes between its cells",
+                                   regions.size(), middle.x(), middle.y(), middle.z());
+                });
+  return text;
+}
+
 /// Returns a labelled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit
 /// must end.
 std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
@@ -111,6 +134,7 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
     }
     no_template_ = "target: no grid that was tried, of up to 9 times " + std::to_string(options.cells) +
                    " cells, has the topology of its regions" + (names.empty() ? "" : "; missed: " + names) +
+                   crowded_curve(original_) +
                    "; ask for more --cells, or give a --template";
     return std::nullopt;
   }
