@@ -4,7 +4,8 @@
 
 The ball of hexes of order 2 is read and refined by halving its cells in their own coordinates, which leaves the ball what
 it is. Poisson's equation with a known solution, given on the boundary: with Lagrange elements of degree 2 and 3, the L2
-error must fall with the power degree + 1 of the size of the cells, to within 0.3.
+error must fall with the power degree + 1 of the size of the cells, to within 0.3. (GetFEM reads no hexes of order 3 or
+more from .msh.)
 
 Exit status 0 if it does, 1 if not, 77 if there is no GetFEM.
 """
