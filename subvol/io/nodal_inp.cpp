@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/inp_lines.h"
+#include "subvol/io/inp_sets.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/mesh_formats.h"
 #include "subvol/io/nodal_formats.h"
 #include "subvol/io/nodal_sides.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <filesystem>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
+#include <span>
+#include <string>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 namespace subvol::internal {
 
@@ -31,26 +38,6 @@ constexpr InpType kInpTypes[] = {
 constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
 constexpr const char* kShellFamilies[] = {"STRI", "S", "M3D", "R3D", "SFM3D", "DS"};
 
-std::string upper_case(std::string_view text) {
-  std::string upper(text);
-  for (char& c : upper)
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  return upper;
-}
-
-/// The fields between commas, without blanks around them; an empty last field is dropped.
-std::vector<std::string> fields_of(std::string_view line) {
-  std::vector<std::string> fields;
-  std::size_t at = 0;
-  while (at <= line.size()) {
-    const std::size_t end = std::min(line.find(',', at), line.size());
-    fields.push_back(trimmed(line.substr(at, end - at)));
-    at = end + 1;
-  }
-  if (fields.size() > 1 && fields.back().empty()) fields.pop_back();
-  return fields;
-}
-
 /// The number of a name such as REFERENCE_7, or REFERENCE_M7 for -7.
 std::optional<int> numbered(const std::string& name, std::string_view prefix) {
   std::string number = upper_case(name);
@@ -62,29 +49,25 @@ std::optional<int> numbered(const std::string& name, std::string_view prefix) {
   return static_cast<int>(*value);
 }
 
-/// Part of a set: every step-th number of a range, or another set.
-struct InpSetItem {
-  std::int64_t first, last, step;
-  std::size_t other;                  ///< place of the set, or kNoSet
-  std::size_t line;
-};
-constexpr std::size_t kNoSet = static_cast<std::size_t>(-1);
-
-/// A set of elements. Sets may name elements and sets that come later in the file.
-struct InpSet {
-  std::string name;                   ///< as first written
-  std::vector<InpSetItem> items;
-  std::vector<std::size_t> members;   ///< elements, ascending, once `is_resolved`
-  bool is_resolved = false, is_open = false, is_defined = false;
-};
-
 class InpParser {
  public:
-  explicit InpParser(const std::string& name) : name_(name), cells_(mesh_) {}
+  InpParser(const std::string& name, std::string_view bytes)
+      : lines_of_file_(name, bytes),
+        element_sets_("*ELSET", elements_by_label_),
+        node_sets_("*NSET", nodes_),
+        cells_(mesh_) {}
 
-  NodalMesh parse(std::string_view bytes) {
-    read_file_of(name_, bytes, 0);
+  NodalMesh parse() {
+    lines_of_file_.visit([this](const InpLine& line) {
+      line_ = &line;
+      place_ = line.place;
+      line.is_data() ? read_data() : open_keyword();
+    });
+    place_ = lines_of_file_.place();
     if (element_open_) fail("the file ends within an element");
+    left_out_.add("parts without an instance", lines_of_file_.unused_parts());
+    element_sets_.close(place_);
+    node_sets_.close(place_);
     build();
     return std::move(mesh_);
   }
@@ -93,121 +76,76 @@ class InpParser {
   struct Element {
     const InpType* type;
     std::size_t first_node, num_nodes;
-    std::size_t set;          ///< of *ELEMENT, ELSET=; kNone if it has none
+    std::size_t set;  ///< of *ELEMENT, ELSET=; InpSets::kNone if it has none
+    InpPlace place;
   };
   struct Shell {
     std::size_t end;          ///< of its nodes
-    std::size_t set, line;
+    std::size_t set;
+    InpPlace place;
   };
   struct Side {
-    std::int64_t element;     ///< its number, if `set` is kNoSet
+    std::int64_t element;  ///< its number, if `set` is InpSets::kNone
     std::size_t set;
     int number;               ///< of the face
     Index surface;            ///< place in the list of groups
-    std::size_t line;
+    InpPlace place;
   };
-  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  static constexpr std::size_t kNone = InpSets::kNone;
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw InputError(file_ + ":" + std::to_string(line_) + ": " + what);
+  [[noreturn]] void fail(const std::string& what) const { fail_at(place_, what); }
+
+  void open_keyword() {
+    if (element_open_) fail("a keyword within an element: expected more nodes");
+    const std::string& keyword = line_->keyword;
+    if (keyword == "NODE")
+      open_nodes();
+    else if (keyword == "ELEMENT")
+      open_elements();
+    else if (keyword == "NSET" || keyword == "ELSET")
+      open_set();
+    else if (keyword == "SURFACE")
+      open_surface();
+    else if (keyword == "SOLID SECTION")
+      sections_.push_back(element_sets_.named(line_->parameter("ELSET"), line_->instance));
+    else if (keyword == "SYSTEM" || keyword == "NCOPY" || keyword == "NGEN" || keyword == "ELGEN" ||
+             keyword == "NFILL" || keyword == "ELCOPY" || keyword == "NMAP")
+      fail("*" + keyword + " is not read: write the nodes and elements themselves");
+    else
+      left_out_.add("keywords *" + keyword);
   }
 
-  // --- Lines
-  // ----------------------------------------------------------------------------------------------------------
-
-  void read_file_of(const std::string& file, std::string_view bytes, int depth) {
-    file_ = file;
-    line_ = 0;
-    TextScanner lines(file, bytes, TextScanner::Comments::none);
-    while (const auto line = lines.line()) {
-      line_ = lines.word_line();
-      const std::string text = trimmed(*line);
-      if (text.empty() || text.starts_with("**")) continue;
-      if (!text.starts_with("*")) {
-        read_data(text);
-        continue;
-      }
-      if (element_open_) fail("a keyword within an element: expected more nodes");
-      open_keyword(text);
-      if (keyword_ == "INCLUDE") include(depth);
-      file_ = file;
-      line_ = lines.word_line();
-    }
+  void read_data() {
+    const std::string& keyword = line_->keyword;
+    const std::vector<std::string>& fields = line_->fields;
+    if (keyword == "NODE")
+      read_node(fields);
+    else if (keyword == "ELEMENT")
+      read_element(fields);
+    else if (keyword == "NSET" || keyword == "ELSET")
+      read_set(fields);
+    else if (keyword == "SURFACE")
+      read_surface(fields);
   }
 
-  void include(int depth) {
-    constexpr int kMostDepth = 8, kMostFiles = 64;  // far beyond any model; a file may include itself
-    const std::string input = parameter("INPUT");
-    if (input.empty()) fail("*INCLUDE: expected INPUT=FILE");
-    if (depth + 1 > kMostDepth || ++num_included_ > kMostFiles)
-      fail("*INCLUDE: more than " + std::to_string(kMostDepth) + " files in one another, or more than " +
-           std::to_string(kMostFiles) + " in all");
-    const std::filesystem::path path = std::filesystem::path(file_).parent_path() / input;
-    read_file_of(path.string(), read_file(path), depth + 1);
-  }
-
-  /// Splits "*KEYWORD, NAME=VALUE, NAME".
-  void open_keyword(const std::string& text) {
-    parameters_.clear();
-    const std::vector<std::string> fields = fields_of(std::string_view(text).substr(1));
-    keyword_ = upper_case(fields[0]);
-    for (std::size_t i = 1; i < fields.size(); ++i) {
-      const std::size_t equals = fields[i].find('=');
-      std::string value = equals == std::string::npos ? "" : trimmed(std::string_view(fields[i]).substr(equals + 1));
-      if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
-      parameters_[upper_case(trimmed(std::string_view(fields[i]).substr(0, equals)))] = value;
-    }
-    if (keyword_ == "NODE") open_nodes();
-    else if (keyword_ == "ELEMENT") open_elements();
-    else if (keyword_ == "NSET" || keyword_ == "ELSET") open_set();
-    else if (keyword_ == "SURFACE") open_surface();
-    else if (keyword_ == "SOLID SECTION") sections_.push_back(upper_case(parameter("ELSET")));
-    else if (keyword_ == "PART") open_part();
-    else if (keyword_ == "SYSTEM" || keyword_ == "NCOPY" || keyword_ == "NGEN" || keyword_ == "ELGEN" ||
-             keyword_ == "NFILL" || keyword_ == "ELCOPY" || keyword_ == "NMAP")
-      fail("*" + keyword_ + " is not read: write the nodes and elements themselves");
-    else if (keyword_ != "INCLUDE" && keyword_ != "HEADING" && !keyword_.starts_with("END") && keyword_ != "ASSEMBLY" &&
-             keyword_ != "INSTANCE")
-      left_out_.add("keywords *" + keyword_);
-  }
-
-  std::string parameter(const char* name) const {
-    const auto found = parameters_.find(name);
-    return found == parameters_.end() ? "" : found->second;
-  }
-  bool has_parameter(const char* name) const { return parameters_.contains(name); }
-
-  void read_data(const std::string& text) {
-    const std::vector<std::string> fields = fields_of(text);
-    if (keyword_ == "NODE") read_node(fields);
-    else if (keyword_ == "ELEMENT") read_element(fields);
-    else if (keyword_ == "NSET" || keyword_ == "ELSET") read_set(fields);
-    else if (keyword_ == "SURFACE") read_surface(fields);
-    else if (keyword_ == "INSTANCE") require_unmoved(fields);
-  }
-
-  std::int64_t label(const std::string& text, const char* what) const {
+  std::int64_t positive(const std::string& text, const char* what) const {
     const auto value = parse_integer(text);
-    if (!value || *value <= 0) fail(std::string("expected ") + what + " (a positive whole number), found " +
-                                    in_quotes(text));
+    if (!value || *value <= 0)
+      fail(std::string("expected ") + what + " (a positive whole number), found " + in_quotes(text));
+    if (*value >= kInpNumbers) fail(std::string("expected ") + what + " below " + std::to_string(kInpNumbers));
     return *value;
   }
-
-  void require_unmoved(const std::vector<std::string>& fields) const {
-    for (const std::string& field : fields)
-      if (const auto value = parse_number(field); !value || *value != 0)
-        fail("*INSTANCE: a part that is moved; expected it in its place");
+  /// The number of a node or an element of an instance; null: the assembly.
+  std::int64_t label(const std::string& text, const char* what, const InpInstance* instance) const {
+    return positive(text, what) + (instance ? instance->first : 0);
   }
-
-  void open_part() {
-    if (++num_parts_ > 1) fail("a second *PART: expected a file of one part");
-  }
+  std::int64_t label(const std::string& text, const char* what) const { return label(text, what, line_->instance); }
 
   // --- Nodes and elements
   // ---------------------------------------------------------------------------------------------
 
   void open_nodes() {
-    if (const std::string system = parameter("SYSTEM"); !system.empty() && upper_case(system) != "R")
+    if (const std::string system = line_->parameter("SYSTEM"); !system.empty() && upper_case(system) != "R")
       fail("*NODE, SYSTEM=" + system + ": expected rectangular coordinates");
   }
 
@@ -222,13 +160,14 @@ class InpParser {
       if (!value) fail("expected a coordinate (a finite number), found " + in_quotes(fields[k]));
       p[static_cast<Eigen::Index>(k - 1)] = *value;
     }
+    if (line_->instance) p = line_->instance->rotation * p + line_->instance->shift;
     const auto [known, is_new] = nodes_.try_emplace(number, static_cast<Index>(mesh_.positions.size()));
     if (is_new) mesh_.positions.push_back(p);
     else mesh_.positions[known->second] = p;  // a later definition replaces an earlier one
   }
 
   void open_elements() {
-    const std::string type = upper_case(parameter("TYPE"));
+    const std::string type = upper_case(line_->parameter("TYPE"));
     if (type.empty()) fail("*ELEMENT: expected TYPE=");
     type_ = nullptr;
     shell_corners_ = 0;
@@ -246,7 +185,7 @@ class InpParser {
         fail("elements of type " + in_quotes(type) + " are not read, expected C3D4, 5, 6, 8, 10, 15, 20 or 27");
       type_ = found;
     }
-    set_ = has_parameter("ELSET") ? element_set(parameter("ELSET")) : kNone;
+    set_ = line_->has("ELSET") ? element_sets_.defined(line_->parameter("ELSET"), line_->instance) : kNone;
     skipped_type_ = type;
   }
 
@@ -261,7 +200,7 @@ class InpParser {
   void read_shell(const std::vector<std::string>& fields) {
     if (fields.size() <= shell_corners_) fail("fewer nodes than an element of its type has");
     for (std::size_t i = 1; i <= shell_corners_; ++i) shell_nodes_.push_back(label(fields[i], "the number of a node"));
-    shells_.push_back({shell_nodes_.size(), set_, line_});
+    shells_.push_back({shell_nodes_.size(), set_, place_});
   }
 
   void read_element(const std::vector<std::string>& fields) {
@@ -273,11 +212,10 @@ class InpParser {
     std::size_t at = 0;
     if (!element_open_) {
       const std::int64_t number = label(fields[at++], "the number of an element");
-      if (!elements_by_label_.try_emplace(number, elements_.size()).second)
-        fail("a second element " + std::to_string(number));
-      if (set_ != kNone) element_sets_[set_].items.push_back({number, number, 1, kNoSet, line_});
-      elements_.push_back({type_, element_nodes_.size(), static_cast<std::size_t>(type_->digits), set_});
-      lines_.push_back(line_);
+      if (!elements_by_label_.try_emplace(number, static_cast<Index>(elements_.size())).second)
+        fail("a second element " + std::to_string(number % kInpNumbers));
+      if (set_ != kNone) element_sets_.add_range(set_, number, number, 1, place_);
+      elements_.push_back({type_, element_nodes_.size(), static_cast<std::size_t>(type_->digits), set_, place_});
       element_open_ = true;
     }
     const std::size_t end = elements_.back().first_node + elements_.back().num_nodes;
@@ -291,104 +229,66 @@ class InpParser {
   // --- Sets
   // -----------------------------------------------------------------------------------------------------------
 
-  /// Returns the place of a set, which may still have to be defined.
-  std::size_t named_set(const std::string& name) {
-    const auto [known, is_new] = set_numbers_.try_emplace(upper_case(name), element_sets_.size());
-    if (is_new) element_sets_.emplace_back().name = name;
-    return known->second;
-  }
-  std::size_t element_set(const std::string& name) {
-    const std::size_t set = named_set(name);
-    if (!element_sets_[set].is_defined) element_sets_[set].name = name;
-    element_sets_[set].is_defined = true;
-    return set;
+  /// The instance whose sets and numbers a line of a set or a surface names.
+  const InpInstance* instance_of_set() const {
+    if (line_->instance || !line_->has("INSTANCE")) return line_->instance;
+    const InpInstance* instance = lines_of_file_.instance(line_->parameter("INSTANCE"));
+    if (!instance) fail("there is no instance " + in_quotes(line_->parameter("INSTANCE")));
+    return instance;
   }
 
   void open_set() {
-    const std::string name = parameter(keyword_ == "NSET" ? "NSET" : "ELSET");
-    if (name.empty()) fail("*" + keyword_ + ": expected a name");
-    if (keyword_ == "NSET") left_out_.add("node sets");
-    else set_ = element_set(name);
+    const std::string name = line_->parameter(line_->keyword.c_str());
+    if (name.empty()) fail("*" + line_->keyword + ": expected a name");
+    sets_ = line_->keyword == "NSET" ? &node_sets_ : &element_sets_;
+    set_ = sets_->defined(name, line_->instance);
+    from_element_set_ = sets_ == &node_sets_ && line_->has("ELSET");
+    if (from_element_set_) left_out_.add("node sets of element sets");
   }
 
   void read_set(const std::vector<std::string>& fields) {
-    if (keyword_ == "NSET") return;
-    if (has_parameter("GENERATE")) {
+    if (from_element_set_) return;
+    const InpInstance* instance = instance_of_set();
+    if (line_->has("GENERATE")) {
       if (fields.size() < 2) fail("GENERATE: expected a first and a last number");
-      const std::int64_t first = label(fields[0], "the first number"), last = label(fields[1], "the last number");
-      const std::int64_t step = fields.size() > 2 ? label(fields[2], "the step") : 1;
-      element_sets_[set_].items.push_back({first, last, step, kNoSet, line_});
+      const std::int64_t first = label(fields[0], "the first number", instance),
+                         last = label(fields[1], "the last number", instance);
+      sets_->add_range(set_, first, last, fields.size() > 2 ? positive(fields[2], "the step") : 1, place_);
       return;
     }
     for (const std::string& field : fields) {
       if (field.empty()) continue;
-      if (parse_integer(field)) {
-        const std::int64_t number = label(field, "the number of an element");
-        element_sets_[set_].items.push_back({number, number, 1, kNoSet, line_});
+      const auto [own, rest] = split(field, instance);
+      if (parse_integer(rest)) {
+        const std::int64_t number = label(rest, "the number of a member", own);
+        sets_->add_range(set_, number, number, 1, place_);
       } else {
-        const std::size_t other = named_set(field);
-        element_sets_[set_].items.push_back({0, 0, 1, other, line_});
+        sets_->add_set(set_, sets_->named(rest, own), place_);
       }
     }
   }
 
-  /// Finds the members of a set. The work is bounded: sets of sets could double with every line.
-  const std::vector<std::size_t>& members_of(std::size_t s, int depth = 0) {
-    constexpr std::size_t kMostWork = 1u << 28;
-    constexpr int kMostDepth = 64;
-    if (element_sets_[s].is_resolved) return element_sets_[s].members;
-    if (element_sets_[s].is_open || depth > kMostDepth)
-      fail("*ELSET: the set " + in_quotes(element_sets_[s].name) + " includes itself, or is nested too deeply");
-    element_sets_[s].is_open = true;
-    std::vector<std::size_t> members;
-    for (const InpSetItem& item : element_sets_[s].items) {
-      line_ = item.line;
-      if (item.other != kNoSet) {
-        if (!element_sets_[item.other].is_defined)
-          fail("*ELSET: there is no set " + in_quotes(element_sets_[item.other].name));
-        const std::vector<std::size_t>& others = members_of(item.other, depth + 1);
-        members.insert(members.end(), others.begin(), others.end());
-        set_work_ += others.size();
-      } else {
-        append_range(item, members);
-      }
-      if (set_work_ > kMostWork) fail("*ELSET: sets with too many members");
-    }
-    std::sort(members.begin(), members.end());
-    members.erase(std::unique(members.begin(), members.end()), members.end());
-    InpSet& set = element_sets_[s];
-    set.members = std::move(members);
-    set.is_resolved = true;
-    return set.members;
-  }
-
-  /// A range may claim any size: it is looked through from its shorter side.
-  void append_range(const InpSetItem& item, std::vector<std::size_t>& members) {
-    if (item.last < item.first) return;
-    const std::int64_t size = (item.last - item.first) / item.step + 1;
-    if (static_cast<std::uint64_t>(size) <= elements_by_label_.size()) {
-      for (std::int64_t k = 0; k < size; ++k)
-        if (const auto found = elements_by_label_.find(item.first + k * item.step); found != elements_by_label_.end())
-          members.push_back(found->second);
-      set_work_ += static_cast<std::size_t>(size);
-      return;
-    }
-    for (const auto& [number, element] : elements_by_label_)
-      if (number >= item.first && number <= item.last && (number - item.first) % item.step == 0)
-        members.push_back(element);
-    set_work_ += elements_by_label_.size();
+  /// Splits INSTANCE.NUMBER and INSTANCE.SET. Returns the instance, and what is behind its name.
+  std::pair<const InpInstance*, std::string> split(const std::string& field, const InpInstance* otherwise) const {
+    for (std::size_t dot = field.rfind('.'); dot != std::string::npos && dot > 0; dot = field.rfind('.', dot - 1))
+      if (const InpInstance* instance = lines_of_file_.instance(field.substr(0, dot)))
+        return {instance, field.substr(dot + 1)};
+    return {otherwise, field};
   }
 
   void open_surface() {
-    const std::string type = upper_case(parameter("TYPE"));
+    const std::string type = upper_case(line_->parameter("TYPE"));
     surface_ = kNoIndex;
     if (!type.empty() && type != "ELEMENT") {
       left_out_.add("surfaces of nodes");
       return;
     }
-    const std::string name = parameter("NAME");
+    const std::string name = line_->parameter("NAME");
     const std::optional<int> number = numbered(name, "GROUP_");
-    surface_ = number ? faces_.by_number(*number) : faces_.by_name(name);
+    const bool is_inside = line_->instance && !line_->instance->name.empty();
+    surface_ =
+        number ? faces_.by_number(*number) : faces_.by_name(is_inside ? line_->instance->name + "." + name : name);
+    if (is_inside && !number) plain_names_[surface_] = name;
   }
 
   void read_surface(const std::vector<std::string>& fields) {
@@ -400,9 +300,11 @@ class InpParser {
       left_out_.add("lines of surfaces without a face S1 to S6");
       return;
     }
-    const bool is_element = parse_integer(fields[0]).has_value();
-    sides_.push_back({is_element ? label(fields[0], "the number of an element") : 0,
-                      is_element ? kNoSet : named_set(fields[0]), static_cast<int>(*number), surface_, line_});
+    const auto [instance, rest] = split(fields[0], instance_of_set());
+    const bool is_element = parse_integer(rest).has_value();
+    sides_.push_back({is_element ? label(rest, "the number of an element", instance) : 0,
+                      is_element ? kNone : element_sets_.named(rest, instance), static_cast<int>(*number), surface_,
+                      place_});
   }
 
   // --- Building the mesh
@@ -414,10 +316,10 @@ class InpParser {
     std::vector<Index> of_face;
     std::size_t begin = 0;
     for (const Shell& shell : shells_) {
-      line_ = shell.line;
+      place_ = shell.place;
       for (; begin < shell.end; ++begin) mesh_.shells.face_vertices.push_back(node_of(shell_nodes_[begin]));
       mesh_.shells.face_offsets.push_back(mesh_.shells.face_vertices.size());
-      of_face.push_back(shell.set == kNone ? kNoIndex : groups.by_name(element_sets_[shell.set].name));
+      of_face.push_back(shell.set == kNone ? kNoIndex : groups.by_name(element_sets_.name(shell.set)));
     }
     if (groups.groups().size() + (std::find(of_face.begin(), of_face.end(), kNoIndex) != of_face.end()) > 1)
       mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
@@ -435,19 +337,21 @@ class InpParser {
       cells_.add(element.type->kind, element.type->order, NodeOrdering::vtk, nodes);
     }
     add_sides();
+    add_node_sets();
+    mesh_.face_groups.groups = group_names();
     choose_references();
     for (const auto& [type, n] : num_skipped_) left_out_.add("elements of type " + type, n);
     left_out_.tell(mesh_.warnings);
   }
 
   Index node(const Element& element, std::size_t i, std::size_t e) {
-    line_ = lines_[e];
+    place_ = elements_[e].place;
     return node_of(element_nodes_[element.first_node + i]);
   }
   Index node_of(std::int64_t number) const {
     const auto found = nodes_.find(number);
     if (found == nodes_.end())
-      fail("an element names node " + std::to_string(number) + ", which the file does not have");
+      fail("an element names node " + std::to_string(number % kInpNumbers) + ", which the file does not have");
     return found->second;
   }
 
@@ -461,21 +365,93 @@ class InpParser {
 
   void add_sides() {
     for (const Side& side : sides_) {
-      line_ = side.line;
-      if (side.set == kNoSet) {
+      place_ = side.place;
+      if (side.set == kNone) {
         const auto found = elements_by_label_.find(side.element);
         if (found != elements_by_label_.end()) add_side(side, found->second);  // else one that is skipped
         continue;
       }
-      if (!element_sets_[side.set].is_defined)
-        fail("*SURFACE: there is no element set " + in_quotes(element_sets_[side.set].name));
-      const std::vector<std::size_t>& members = members_of(side.set);
-      line_ = side.line;
-      for (const std::size_t element : members) add_side(side, element);
+      if (!element_sets_.is_defined(side.set))
+        fail("*SURFACE: there is no element set " + in_quotes(element_sets_.name(side.set)));
+      for (const Index element : element_sets_.members(side.set)) add_side(side, element);
       constexpr std::size_t kMostFaces = 1u << 26;
       if (mesh_.face_groups.faces.size() > kMostFaces) fail("*SURFACE: too many faces");
     }
-    mesh_.face_groups.groups = faces_.take();
+  }
+
+  /// The names of the groups: those of instances without the instance if no other group has the name.
+  std::vector<Group> group_names() {
+    std::vector<Group> groups = faces_.take();
+    std::map<std::string, int> times;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto plain = plain_names_.find(static_cast<Index>(g));
+      ++times[plain == plain_names_.end() ? groups[g].name : plain->second];
+    }
+    for (const auto& [g, name] : plain_names_)
+      if (times[name] == 1) groups[g].name = name;
+    return groups;
+  }
+
+  /// Makes groups of the faces of the boundary all of whose corners are in a set of nodes. No groups are made of sets
+  /// without such a face or with all of them, or that have the name of a surface.
+  void add_node_sets() {
+    std::vector<std::size_t> wanted;
+    for (std::size_t s = 0; s < node_sets_.size(); ++s)
+      if (node_sets_.is_defined(s) && !has_group(node_sets_.name(s))) wanted.push_back(s);
+    if (wanted.empty()) return;
+    const std::vector<std::array<Index, 4>> boundary = boundary_faces();
+    std::vector<std::vector<Index>> faces_at(mesh_.positions.size());
+    for (std::size_t f = 0; f < boundary.size(); ++f) faces_at[boundary[f][0]].push_back(static_cast<Index>(f));
+    std::vector<std::size_t> in_set(mesh_.positions.size(), kNone);
+    std::vector<Index> faces;
+    for (const std::size_t s : wanted) {
+      const std::vector<Index>& members = node_sets_.members(s);
+      for (const Index v : members) in_set[v] = s;
+      faces.clear();
+      for (const Index v : members)
+        for (const Index f : faces_at[v])
+          if (std::ranges::all_of(boundary[f], [&](Index w) { return w == kNoIndex || in_set[w] == s; }))
+            faces.push_back(f);
+      if (faces.empty() || faces.size() == boundary.size()) {
+        left_out_.add("node sets of no faces, or of all");
+        continue;
+      }
+      const Index group = faces_.by_name(node_sets_.name(s));
+      for (const Index f : faces) {
+        const std::size_t size = boundary[f][3] == kNoIndex ? 3 : 4;
+        add_face(mesh_, std::span(boundary[f]).first(size), group);
+      }
+    }
+  }
+
+  bool has_group(const std::string& name) const {
+    const auto is_name = [&](const std::string& other) { return upper_case(other) == upper_case(name); };
+    return std::ranges::any_of(faces_.groups(),
+                               [&](const Group& group) {
+                                 return is_name(group.name) ||
+                                        (group.name.empty() && is_name("GROUP_" + std::to_string(group.number)));
+                               }) ||
+           std::ranges::any_of(plain_names_, [&](const auto& plain) { return is_name(plain.second); });
+  }
+
+  /// The faces of one cell, by their corners; the fourth of a triangle is kNoIndex.
+  std::vector<std::array<Index, 4>> boundary_faces() const {
+    const auto tables = faces_by_kind(inp_faces);
+    std::vector<std::pair<FaceKey, std::array<Index, 4>>> faces;
+    for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
+      for (const std::vector<int>& local : tables[static_cast<std::size_t>(mesh_.kinds[c])]) {
+        std::array<Index, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
+        for (std::size_t i = 0; i < local.size(); ++i) corners[i] = mesh_.cell(c)[static_cast<std::size_t>(local[i])];
+        faces.emplace_back(face_key(std::span(corners).first(local.size())), corners);
+      }
+    std::sort(faces.begin(), faces.end());
+    std::vector<std::array<Index, 4>> boundary;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const bool is_twin = (i > 0 && faces[i - 1].first == faces[i].first) ||
+                           (i + 1 < faces.size() && faces[i + 1].first == faces[i].first);
+      if (!is_twin) boundary.push_back(faces[i].second);
+    }
+    return boundary;
   }
 
   void add_side(const Side& side, std::size_t element) {
@@ -492,11 +468,11 @@ class InpParser {
   /// of *ELEMENT.
   std::vector<std::size_t> material_sets() const {
     std::vector<std::size_t> sets;
-    for (const std::string& section : sections_)
-      if (const auto set = set_numbers_.find(section); set != set_numbers_.end()) sets.push_back(set->second);
+    for (const std::size_t set : sections_)
+      if (element_sets_.is_defined(set)) sets.push_back(set);
     if (!sets.empty()) return sets;
     for (std::size_t s = 0; s < element_sets_.size(); ++s)
-      if (own_reference(s)) sets.push_back(s);
+      if (element_sets_.is_defined(s) && own_reference(s)) sets.push_back(s);
     if (!sets.empty()) return sets;
     std::set<std::size_t> of_elements;
     for (const Element& element : elements_)
@@ -505,7 +481,7 @@ class InpParser {
   }
 
   /// The reference that a set of subvol stands for: REFERENCE_7, or REFERENCE_M7 for -7.
-  std::optional<int> own_reference(std::size_t set) const { return numbered(element_sets_[set].name, "REFERENCE_"); }
+  std::optional<int> own_reference(std::size_t set) const { return numbered(element_sets_.name(set), "REFERENCE_"); }
 
   void choose_references() {
     const std::vector<std::size_t> sets = material_sets();
@@ -515,58 +491,59 @@ class InpParser {
     int next = 1;
     for (const std::size_t s : materials) {
       const std::optional<int> own = own_reference(s);
-      const std::vector<std::size_t>& members = members_of(s);
+      const std::vector<Index>& members = element_sets_.members(s);
       if (members.empty() || (!own && materials.size() == 1 && members.size() == elements_.size())) continue;
       const int reference = own ? *own : next++;
-      for (const std::size_t element : members) mesh_.references[element] = reference;
-      if (!own) mesh_.regions.push_back({element_sets_[s].name, reference, 3});
+      for (const Index element : members) mesh_.references[element] = reference;
+      if (!own)
+        mesh_.regions.push_back({element_sets_.name(s), reference, 3});
       else name_region(reference, s, used);
     }
-    left_out_.add("element sets", element_sets_.size() - used.size());
+    std::size_t defined = 0;
+    for (std::size_t s = 0; s < element_sets_.size(); ++s) defined += element_sets_.is_defined(s);
+    left_out_.add("element sets", defined - std::min(defined, used.size()));
   }
 
   /// A set that holds nothing but the set of one of our references has its name.
   void name_region(int reference, std::size_t own, std::set<std::size_t>& used) {
     for (std::size_t s = 0; s < element_sets_.size(); ++s) {
-      const InpSet& set = element_sets_[s];
-      if (used.contains(s) || set.items.size() != 1 || set.items[0].other != own) continue;
-      mesh_.regions.push_back({set.name, reference, 3});
+      if (used.contains(s) || element_sets_.only_other(s) != own) continue;
+      mesh_.regions.push_back({element_sets_.name(s), reference, 3});
       used.insert(s);
       return;
     }
   }
 
-  std::string name_, file_, keyword_, skipped_type_;
-  std::size_t line_ = 0;
+  InpLines lines_of_file_;
+  const InpLine* line_ = nullptr;
+  InpPlace place_;  ///< of what is read or built, for messages
+  std::unordered_map<std::int64_t, Index> nodes_, elements_by_label_;
+  InpSets element_sets_, node_sets_;
   NodalMesh mesh_;
   NodalCells cells_;
   LeftOut left_out_;
-  std::map<std::string, std::string> parameters_;
-  std::unordered_map<std::int64_t, Index> nodes_;
-  std::unordered_map<std::int64_t, std::size_t> elements_by_label_;
   std::vector<Element> elements_;
-  std::vector<std::size_t> lines_;                   ///< of elements
   std::vector<std::int64_t> element_nodes_;
   std::vector<Shell> shells_;
   std::vector<std::int64_t> shell_nodes_;            ///< corners
   std::size_t shell_corners_ = 0;                    ///< of the elements being read; 0: no shells
-  std::vector<InpSet> element_sets_;
-  std::map<std::string, std::size_t> set_numbers_;   ///< by name in upper case
   std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types
-  std::vector<std::string> sections_;
+  std::vector<std::size_t> sections_;                ///< their sets of elements
   GroupList faces_;
+  std::map<Index, std::string> plain_names_;  ///< of surfaces of instances, without the instance
   std::vector<Side> sides_;
   const InpType* type_ = nullptr;
-  std::size_t set_ = kNone, set_work_ = 0;
+  std::string skipped_type_;
+  InpSets* sets_ = nullptr;  ///< of the set that is being read
+  std::size_t set_ = kNone;
   Index surface_ = kNoIndex;
-  bool element_open_ = false;
-  int num_included_ = 0, num_parts_ = 0;
+  bool element_open_ = false, from_element_set_ = false;
 };
 
 }  // namespace
 
 NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::string&) {
-  return InpParser(name).parse(bytes);
+  return InpParser(name, bytes).parse();
 }
 
 }  // namespace subvol::internal

@@ -264,7 +264,48 @@ TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]")
              Contains("includes itself"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n*SURFACE, NAME=s\nnone, S1\n"),
              Contains("no element set 'none'"));
-  CHECK_THAT(nodal_refusal("a.inp", nodes + "*PART, NAME=a\n*PART, NAME=b\n"), Contains("one part"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*PART, NAME=a\n*PART, NAME=b\n"), Contains("a part within a part"));
+  const std::string part = "*PART, NAME=a\n" + nodes + "*END PART\n*ASSEMBLY, NAME=all\n";
+  CHECK_THAT(nodal_refusal("a.inp", part + "*INSTANCE, NAME=b, PART=c\n*END INSTANCE\n"),
+             Contains("a.inp:9: ") && Contains("no part 'c'"));
+  CHECK_THAT(nodal_refusal("a.inp", part + "*INSTANCE, NAME=b, PART=a\n0,0,x\n*END INSTANCE\n"),
+             Contains("expected a number, found 'x'"));
+  CHECK_THAT(nodal_refusal("a.inp", part + "*INSTANCE, NAME=b, PART=a\n0,0,0\n0,0,0,0,0,0,90\n*END INSTANCE\n"),
+             Contains("two points of the axis are one"));
+  CHECK_THAT(nodal_refusal("a.inp", part + "*NSET, NSET=s, INSTANCE=d\n1\n"), Contains("no instance 'd'"));
+}
+
+TEST_CASE("nodal_mesh: parts of Abaqus at several places, with the sets of each", "[io]") {
+  const std::string text =
+      "*Part, name=block\n*Node\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
+      "*Element, type=C3D8\n1, 1,2,3,4, 5,6,7,8\n*Elset, elset=whole\n1,\n*Nset, nset=high, generate\n5, 8\n"
+      "*Surface, name=base\nwhole, S1\n*Solid Section, elset=whole, material=steel\n*End Part\n"
+      "*Part, name=wedge\n*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*Element, type=C3D4, elset=tip\n7, 1,2,3,4\n"
+      "*Solid Section, elset=tip, material=wood\n*End Part\n*Part, name=spare\n*End Part\n*Assembly, name=all\n"
+      "*Instance, name=b-1, part=block\n*End Instance\n"
+      "*Instance, name=b-2, part=block\n3., 0., 0.\n3., 0., 0., 3., 0., 1., 90.\n*End Instance\n"
+      "*Instance, name=w, part=wedge\n0., 5., 0.\n*End Instance\n"
+      "*Nset, nset=held, instance=b-2\n1, 2, 5, 6\n*Nset, nset=one, instance=b-1\n1,\n"
+      "*Surface, name=lids\nb-1.whole, S2\nb-2.1, S2\n*End Assembly\n";
+  const NodalMesh mesh = read("a.inp", text);
+  REQUIRE(mesh.num_cells() == 3);
+  CHECK((mesh.positions[mesh.cell(1)[1]] - Vec3(3, 1, 0)).norm() < 1e-14);
+  CHECK((mesh.positions[mesh.cell(1)[7]] - Vec3(2, 0, 1)).norm() < 1e-14);
+  CHECK((mesh.positions[mesh.cell(2)[0]] - Vec3(0, 5, 0)).norm() < 1e-14);
+  std::map<std::string, int> regions, groups;
+  for (const Group& region : mesh.regions) regions[region.name] = region.number;
+  CHECK(regions.size() == 3);  // a set that two instances have keeps the instance in its name
+  for (std::size_t c = 0; c < 3; ++c)
+    CHECK(mesh.references[c] == regions.at(std::array{"b-1.whole", "b-2.whole", "tip"}[c]));
+  for (const GroupedFace& face : mesh.face_groups.faces)
+    ++groups[mesh.face_groups.groups[static_cast<std::size_t>(face.group)].name];
+  CHECK(groups == std::map<std::string, int>{
+                      {"b-1.base", 1}, {"b-2.base", 1}, {"lids", 2}, {"held", 1}, {"b-1.high", 1}, {"b-2.high", 1}});
+  const auto held = std::ranges::find(mesh.face_groups.groups, "held", &Group::name) - mesh.face_groups.groups.begin();
+  const auto second = mesh.cell(1);
+  CHECK(group_of(mesh.face_groups, std::array<Index, 4>{second[0], second[1], second[4], second[5]}) == held);
+  REQUIRE(mesh.warnings.size() == 1);
+  CHECK_THAT(mesh.warnings[0], Contains("1 parts without an instance") && Contains("1 node sets of no faces"));
 }
 
 TEST_CASE("nodal_mesh: numbers of a .inp have twenty characters at most, which is what CalculiX reads", "[io]") {
