@@ -84,6 +84,7 @@ const std::vector<Library> kLibraries{
     {"zlib", {"subvol/io", "export", "tests"}, ".cpp"},
     {"lz4", {"subvol/io"}, ".cpp"},
     {"netcdf", {"subvol/io"}, "_netcdf.cpp"},
+    {"assimp/", {"subvol/io"}, "_assimp.cpp"},
     {"cgnslib", {"subvol/io", "tests/subvol/io"}, "_cgns.cpp"},
     {"CLI/", {"cli/verbs"}, ""},
     {"pybind11/", {"python"}, ""},

@@ -4,6 +4,7 @@
 #include "cli/verbs/commands.h"
 #include "subvol/io/file_formats.h"
 #include "subvol/io/nodal_mesh.h"
+#include "subvol/io/surface_io.h"
 
 namespace subvol::cli {
 
@@ -14,9 +15,10 @@ void add_formats_command(CLI::App& app, Action& action) {
     action = [] {
       std::string text = cell_formats_table() + "\n" + surface_formats_table();
       for (const FileFormat& format : file_formats())
-        if ((format.needs_netcdf && !has_exodus()) || (format.needs_cgns && !has_cgns()))
+        if ((format.needs_netcdf && !has_exodus()) || (format.needs_cgns && !has_cgns()) ||
+            (format.needs_assimp && !has_assimp()))
           text += std::string(format.extension) + ": not in this build, which has no " +
-                  (format.needs_netcdf ? "netCDF\n" : "CGNS library\n");
+                  (format.needs_netcdf ? "netCDF\n" : format.needs_cgns ? "CGNS library\n" : "Assimp\n");
       print(text);
       return static_cast<int>(kDone);
     };

@@ -153,6 +153,8 @@ const FileFormat kFormats[] = {
      .groups_written = kNames},
     gltf(".glb"),
     gltf(".gltf"),
+    {.extension = ".fbx", .name = "FBX", .read = kBoth, .groups_read = kNames, .needs_assimp = true},
+    {.extension = ".dae", .name = "COLLADA", .read = "1.4, 1.5", .groups_read = kNames, .needs_assimp = true},
     {.extension = ".usda", .name = "USD", .written = kText, .groups_written = kNames, .holds_features = true},
 };
 

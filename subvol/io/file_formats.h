@@ -27,7 +27,7 @@ struct FileFormat {
   Held regions_read = Held::none, regions_written = Held::none;  ///< references of cells
   bool holds_features = false;                  ///< creases and corners
   bool is_scene = false;                        ///< a scene is written: also cutaways and animations
-  bool needs_netcdf = false, needs_cgns = false;  ///< the library without which it is refused
+  bool needs_netcdf = false, needs_cgns = false, needs_assimp = false;  ///< the library without which it is refused
 };
 
 /// Returns all formats: those of cells, then those of surfaces.

@@ -33,7 +33,8 @@ struct Parser {
 };
 /// By the extensions of `file_formats()` of surfaces that are read.
 constexpr Parser kParsers[] = {{".off", parse_off}, {".obj", parse_obj}, {".stl", parse_stl}, {".ply", parse_ply},
-                               {".vtp", parse_vtp}, {".3mf", parse_3mf}, {".glb", parse_gltf}, {".gltf", parse_gltf}};
+                               {".vtp", parse_vtp}, {".3mf", parse_3mf}, {".glb", parse_gltf}, {".gltf", parse_gltf},
+                               {".fbx", parse_scene}, {".dae", parse_scene}};
 
 /// Warnings and errors about one file.
 class Remarks {

@@ -20,6 +20,7 @@ inline constexpr std::size_t kMaxPolygonCorners = 1000;
 ///   .obj  polygons only; materials and the like are skipped    .ply  1.0, text or binary of either byte order
 ///   .vtp  VTK XML 0.1 to 2.2: polygons and strips              .3mf  objects of the build in their places
 ///   .glb .gltf  2.0: triangles of the scene's nodes in their places, equal positions merged; lines are skipped
+///   .fbx .dae   likewise, polygons, if the library was built with Assimp (`has_assimp`)
 ///
 /// warnings  receives the warnings, one line each with the file's name; may be null.
 /// returns   faces and vertices in the file's order. Dropped, with a warning: corners that repeat the one before, faces
@@ -30,6 +31,9 @@ inline constexpr std::size_t kMaxPolygonCorners = 1000;
 /// no faces, all vertices in one place, coordinates beyond kMostLength, and an extent below kLeastLength. Memory: a few
 /// times the size of the file, whatever it claims.
 PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// Returns true if .fbx and .dae can be read.
+bool has_assimp();
 
 /// Reads polygons like `read_polygon_mesh` and cuts them into triangles (`triangulate`). Also dropped, with a warning:
 /// triangles without area, and all but the first of triangles with the same three positions. InputError: also if no

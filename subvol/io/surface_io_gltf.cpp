@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/face_labels.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/surface_formats.h"
 #include "subvol/io/triangle_welder.h"
@@ -37,8 +38,8 @@ class GltfParser {
       for (const int node : at(model_.scenes, static_cast<int>(scene), "scene").nodes)
         add_node(node, Transform::Identity(), 0);
     }
-    name_groups();
     ParsedSurface parsed{welder_.take(), {}};
+    parsed.mesh.face_groups = labels_.groups();
     left_out_.tell(parsed.warnings);
     return parsed;
   }
@@ -120,13 +121,12 @@ class GltfParser {
       }
       const std::string material =
           primitive.material < 0 ? std::string() : at(model_.materials, primitive.material, "material").name;
-      add_triangles(x, corners, mode, transform, place_of(materials_, material),
-                    place_of(objects_, node.name.empty() ? mesh.name : node.name));
+      add_triangles(x, corners, mode, transform, material, node.name.empty() ? mesh.name : node.name);
     }
   }
 
   void add_triangles(const std::vector<double>& x, const std::vector<std::size_t>& corners, int mode,
-                     const Transform& transform, int material, int object) {
+                     const Transform& transform, const std::string& material, const std::string& object) {
     const bool mirrors = transform.linear().determinant() < 0;
     const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
       if (mirrors) std::swap(b, c);
@@ -135,8 +135,7 @@ class GltfParser {
         if (!p.allFinite()) fail("POSITION: a coordinate that is not finite");
         welder_.add(p);
       }
-      material_of_face_.push_back(material);
-      object_of_face_.push_back(object);
+      labels_.add(material, object);
     };
     if (mode == TINYGLTF_MODE_TRIANGLES) {
       if (corners.size() % 3 != 0) fail("indices: expected three for each triangle");
@@ -198,35 +197,11 @@ class GltfParser {
     }
   }
 
-  /// Place of a name in a list, which it is added to; -1 for no name.
-  static int place_of(std::vector<std::string>& names, const std::string& name) {
-    if (name.empty()) return -1;
-    const auto place = static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
-    if (place == names.size()) names.push_back(name);
-    return static_cast<int>(place);
-  }
-
-  /// Materials that tell faces apart are groups; else nodes are.
-  void name_groups() {
-    const auto has_several = [](const std::vector<int>& list) {
-      return std::any_of(list.begin(), list.end(), [&](int entry) { return entry != list.front(); });
-    };
-    const bool by_material = has_several(material_of_face_);
-    if (!by_material && !has_several(object_of_face_)) return;
-    GroupList groups;
-    const std::vector<std::string>& names = by_material ? materials_ : objects_;
-    std::vector<Index> places;
-    for (const int place : by_material ? material_of_face_ : object_of_face_)
-      welder_.set_group(place < 0 ? kNoIndex : groups.by_name(names[static_cast<std::size_t>(place)]));
-    welder_.name_groups(groups.take());
-  }
-
   std::string name_;
   tinygltf::Model model_;
   TriangleWelder welder_;
   LeftOut left_out_;
-  std::vector<std::string> materials_, objects_;
-  std::vector<int> material_of_face_, object_of_face_;
+  FaceLabels labels_;
   std::size_t num_nodes_ = 0;
 };
 

@@ -82,6 +82,11 @@ void write_variants(const fs::path& folder) {
                                 "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n");
   write(folder / "inp", "sets", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n1,1,2,3,4\n"
                                 "*ELSET,ELSET=g,GENERATE\n1,9,2\n*ELSET,ELSET=s\ng,e\n*SURFACE,NAME=f\ns,S2\n");
+  write(folder / "inp", "parts",
+        "*PART,NAME=p\n*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n"
+        "1,1,2,3,4\n*NSET,NSET=n\n1,2,3\n*END PART\n*ASSEMBLY,NAME=a\n*INSTANCE,NAME=p-1,PART=p\n"
+        "*END INSTANCE\n*INSTANCE,NAME=p-2,PART=p\n2,0,0\n2,0,0,2,0,1,90\n*END INSTANCE\n"
+        "*NSET,NSET=h,INSTANCE=p-2\n1\n*SURFACE,NAME=f\np-1.e,S1\np-2.1,S2\n*END ASSEMBLY\n");
   write(folder / "bdf", "fields", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID           3              0.    1.+0\n"
                                   "GRID*                  4\n*                      1.\nCTETRA,1,1,1,2,3,4\n"
                                   "CTRIA3,2,5,1,2,3\n");
@@ -105,6 +110,22 @@ void write_surfaces(const fs::path& folder) {
   scene.nodes.push_back(
       {"tetrahedron", {.positions = tetrahedron.positions, .indices = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}}});
   write(folder / "glb", "tetrahedron", gltf_bytes(scene, GltfContainer::glb));
+  write(folder / "gltf", "tetrahedron", gltf_bytes(scene, GltfContainer::gltf));
+  write(
+      folder / "dae", "triangle",
+      "<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\"><library_geometries><geometry "
+      "id=\"g\"><mesh><source id=\"p\"><float_array id=\"a\" count=\"9\">0 0 0 1 0 0 0 1 0</float_array>"
+      "<technique_common><accessor source=\"#a\" count=\"3\" stride=\"3\"><param name=\"X\" type=\"float\"/><param "
+      "name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source><vertices "
+      "id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices><triangles count=\"1\"><input "
+      "semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>"
+      "<library_visual_scenes><visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene>"
+      "</library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>");
+  write(folder / "fbx", "triangle",
+        "; FBX 7.4.0 project file\nFBXHeaderExtension: {\nFBXVersion: 7400\n}\nObjects: {\nGeometry: 1, "
+        "\"Geometry::\", \"Mesh\" {\nVertices: *9 {\na: "
+        "0,0,0,1,0,0,0,1,0\n}\nPolygonVertexIndex: *3 {\na: 0,1,-3\n}\n}\nModel: 2, \"Model::\", \"Mesh\" {\nVersion: "
+        "232\n}\n}\nConnections: {\nC: \"OO\",2,0\nC: \"OO\",1,2\n}\n");
   write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
                                    "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
   write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

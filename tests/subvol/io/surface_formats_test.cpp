@@ -152,6 +152,40 @@ std::string as_zip64(const std::string& archive) {
          archive.substr(end).replace(10, 2, "\xff\xff").replace(16, 4, unused);
 }
 
+TEST_CASE("surface formats: COLLADA is read in place, with materials as groups", "[io]") {
+  if (!has_assimp()) return;
+  const std::string text = R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="meter" meter="1"/><up_axis>Y_UP</up_axis></asset>
+<library_effects><effect id="e"><profile_COMMON><technique sid="c"><lambert/></technique></profile_COMMON></effect>
+</library_effects>
+<library_materials><material id="m1" name="floor"><instance_effect url="#e"/></material>
+<material id="m2" name="roof"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g" name="box"><mesh>
+<source id="p"><float_array id="pa" count="24">0 0 0 2 0 0 2 1 0 0 1 0 0 0 1 2 0 1 2 1 1 0 1 1</float_array>
+<technique_common><accessor source="#pa" count="8" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist material="a" count="2"><input semantic="VERTEX" source="#v" offset="0"/><vcount>4 4</vcount>
+<p>0 3 2 1 0 1 5 4</p></polylist>
+<polylist material="b" count="4"><input semantic="VERTEX" source="#v" offset="0"/><vcount>4 4 4 4</vcount>
+<p>4 5 6 7 1 2 6 5 2 3 7 6 3 0 4 7</p></polylist></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>10 0 0</translate><instance_geometry url="#g">
+<bind_material><technique_common><instance_material symbol="a" target="#m1"/>
+<instance_material symbol="b" target="#m2"/></technique_common></bind_material></instance_geometry></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+  const PolygonMesh mesh = read_polygon_mesh(format_folder().file("box.dae", text));
+  CHECK(mesh.num_faces() == 6);
+  CHECK(mesh.face_vertices.size() == 24);  // quads
+  REQUIRE(mesh.positions.size() == 8);
+  for (const Vec3& p : mesh.positions) CHECK((p.x() == 10 || p.x() == 12));
+  const std::map<std::string, double> found = areas(mesh);
+  CHECK(found.at("floor") == Approx(4));
+  CHECK(found.at("roof") == Approx(6));
+  CHECK_THROWS_WITH(read_polygon_mesh(format_folder().file("cut.dae", text.substr(0, 900))), Contains("cut.dae"));
+  CHECK_THROWS_WITH(read_polygon_mesh(format_folder().file("no.fbx", "; FBX 7.4.0\n")), Contains("no.fbx"));
+}
+
 TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "[io]") {
   const std::string model = R"(<?xml version="1.0"?><model unit="millimeter" xmlns="x"><resources>
 <basematerials id="9"><base name="steel" displaycolor="#FFF"/><base name="brass" displaycolor="#000"/></basematerials>

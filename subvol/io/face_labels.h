@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/mesh/face_groups.h"
+
+#include <string>
+#include <vector>
+
+namespace subvol::internal {
+
+/// The materials and objects of the faces of a scene, of which groups are made.
+class FaceLabels {
+ public:
+  /// Adds the labels of the next face; empty: none.
+  void add(const std::string& material, const std::string& object);
+  /// Returns the groups: materials if they tell faces apart; else objects; none if these do not either.
+  FaceGroups groups() const;
+
+ private:
+  struct List {
+    std::vector<std::string> names;
+    std::vector<int> of_face;  ///< a place in `names`; -1: none
+    void add(const std::string& name);
+    bool tells_apart() const;
+  };
+  List materials_, objects_;
+};
+
+}  // namespace subvol::internal
