@@ -5,11 +5,13 @@
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
 #include "subvol/export/text_format.h"
+#include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 namespace subvol {
 
@@ -119,32 +121,74 @@ Vec3 origin_of(const Vec3& low, const Vec3& high) {
   return reach > kFar * (high - low).maxCoeff() ? Vec3(low + 0.5 * (high - low)) : Vec3::Zero();
 }
 
-void append_geometry(std::string& text, const PolygonMesh& cage) {
-  const auto number = [&](auto value) { append_number(text, value); };
-  const auto point = [&](const Vec3& p) {
+/// Points of a prim, and the box around them.
+class PlacedPoints {
+ public:
+  explicit PlacedPoints(const std::vector<Vec3>& points) : points_(points), low_(points[0]), high_(points[0]) {
+    for (const Vec3& p : points) low_ = low_.cwiseMin(p), high_ = high_.cwiseMax(p);
+    origin_ = origin_of(low_, high_);
+  }
+
+  void append_place(std::string& text) const {
+    if (!origin_.isZero(0)) {
+      text += "    double3 xformOp:translate = ";
+      append_point(text, origin_);
+      text += "\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+    }
+    append_placed(text, "float3[] extent", {low_, high_});
+  }
+  void append_points(std::string& text) const { append_placed(text, "point3f[] points", points_); }
+
+ private:
+  static void append_point(std::string& text, const Vec3& p) {
     text += '(';
     append_vector(text, p, ", ");
     text += ')';
-  };
-  Vec3 low = cage.positions[0], high = low;
-  for (const Vec3& p : cage.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  const Vec3 origin = origin_of(low, high);
-  const auto placed = [&](const Vec3& p) {
-    if (!(p - origin).cast<float>().allFinite())
-      throw InputError("usd: positions: expected coordinates in the range of float32");
-    point(p - origin);
-  };
-  if (!origin.isZero(0)) {
-    text += "    double3 xformOp:translate = ";
-    point(origin);
-    text += "\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
   }
+  void append_placed(std::string& text, const char* declaration, const std::vector<Vec3>& points) const {
+    append_array(text, declaration, points, [&](const Vec3& p) {
+      if (!(p - origin_).cast<float>().allFinite())
+        throw InputError("usd: positions: expected coordinates in the range of float32");
+      append_point(text, p - origin_);
+    });
+  }
+
+  const std::vector<Vec3>& points_;
+  Vec3 low_, high_, origin_;
+};
+
+void append_geometry(std::string& text, const PolygonMesh& cage) {
+  const auto number = [&](auto value) { append_number(text, value); };
+  const PlacedPoints points(cage.positions);
+  points.append_place(text);
   std::vector<std::size_t> counts;
   for (std::size_t f = 0; f < cage.num_faces(); ++f) counts.push_back(cage.face_offsets[f + 1] - cage.face_offsets[f]);
-  append_array(text, "float3[] extent", std::array{low, high}, placed);
   append_array(text, "int[] faceVertexCounts", counts, number);
   append_array(text, "int[] faceVertexIndices", cage.face_vertices, number);
-  append_array(text, "point3f[] points", cage.positions, placed);
+  points.append_points(text);
+}
+
+/// Appends the cells as a TetMesh. Its tets have a positive volume, and its surface faces outward.
+void append_tets(std::string& text, const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const auto tuple = [&](std::span<const Index> corners) {
+    text += '(';
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if (i > 0) text += ", ";
+      append_number(text, corners[i]);
+    }
+    text += ')';
+  };
+  std::vector<std::span<const Index>> cells, faces;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) cells.push_back(mesh.cell(c));
+  for (const Index f : topology.boundary_faces()) faces.push_back(topology.face(f));
+  const PlacedPoints points(mesh.positions);
+  text += "\ndef TetMesh \"cells\"\n{\n";
+  points.append_place(text);
+  points.append_points(text);
+  append_array(text, "int3[] surfaceFaceVertexIndices", faces, tuple);
+  append_array(text, "int4[] tetVertexIndices", cells, tuple);
+  text += "    uniform token orientation = \"rightHanded\"\n}\n";
 }
 
 void append_tags(std::string& text, const FeatureTags& tags) {
@@ -213,10 +257,15 @@ void append_groups(std::string& text, const FaceGroups& groups) {
 
 }  // namespace
 
+bool consists_of_tets(const VolumeMesh& mesh) {
+  return mesh.num_cells() > 0 && std::ranges::all_of(mesh.kinds, [](CellKind kind) { return kind == CellKind::tet; });
+}
+
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options) {
   require_options(options);
   require_polygons(cage, "usd");
   require_tags(cage, tags);
+  if (options.tets && !consists_of_tets(*options.tets)) throw InputError("usd: TetMesh: expected tets alone");
   std::string text = "#usda 1.0\n(\n    defaultPrim = \"" + options.name + "\"\n    doc = \"subvol " + version() +
                      "\"\n    metersPerUnit = ";
   append_number(text, options.metres_per_unit);
@@ -229,7 +278,9 @@ std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const Usd
           "    uniform token orientation = \"rightHanded\"\n";
   append_tags(text, tags);
   append_groups(text, cage.face_groups);
-  return text + "}\n";
+  text += "}\n";
+  if (options.tets) append_tets(text, *options.tets);
+  return text;
 }
 
 void write_usd(const std::filesystem::path& path, const PolygonMesh& cage, const FeatureTags& tags,

@@ -24,6 +24,7 @@
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/repeated_subdivision.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/templates/template_edit.h"
 
 #include <algorithm>
 #include <array>
@@ -49,15 +50,17 @@ void write_cells(const Output& output, const VolumeMesh& mesh, const WritingOpti
   require_written(output.path, mesh, options.msh_version);
 }
 
+/// tets  the cells inside, if all are tets: .usda holds them as well; null: there are none, or others.
 void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,
-                    const WritingOptions& options) {
+                    const WritingOptions& options, const VolumeMesh* tets = nullptr) {
   if (output.extension == ".obj") {
     write_obj(output.path, surface);
   } else if (is_surface_output(output.extension)) {
     write_surface(output.path, surface);
   } else {
     const SurfaceSceneOptions scene = scene_options(output, options);
-    write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+    write_usd(output.path, surface, tags,
+              {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis, .tets = tets});
   }
   require_written(output.path, surface);
 }
@@ -231,7 +234,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
                                                   scene_options(output, options), cell_regions(mesh)));
   if (output.is_scene()) return write_scene(output.path, boundary_scene(mesh, scene_options(output, options)));
   const TaggedPolygons boundary = tagged_polygons(mesh);
-  write_polygons(output, boundary.polygons, boundary.tags, options);
+  write_polygons(output, boundary.polygons, boundary.tags, options, consists_of_tets(mesh) ? &mesh : nullptr);
 }
 
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {

@@ -3,6 +3,9 @@
 #include "subvol/export/obj_writer.h"
 #include "subvol/export/read_back.h"
 #include "subvol/export/usd_writer.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+#include "tests/support/sample_meshes.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/usda_reader.h"
 
@@ -99,6 +102,21 @@ TEST_CASE("a .usda cage read back has the same points and faces and is a Catmull
   const auto& indices = file.numbers("faceVertexIndices");
   CHECK(std::vector<Index>(indices.begin(), indices.end()) == mesh.face_vertices);
   CHECK(file.numbers("extent") == std::vector<double>{0, 0, 0, 1, 1, 1});
+}
+
+TEST_CASE("a .usda of tets holds the cells beside the cage") {
+  const VolumeMesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {CellKind::tet}, {0, 4}, {0, 1, 2, 3}};
+  CHECK(consists_of_tets(mesh));
+  const std::string text = usd_text(boundary_surface(mesh, MeshTopology(mesh)), {}, {.tets = &mesh});
+  const std::size_t at = text.find("def TetMesh \"cells\"");
+  REQUIRE(at != std::string::npos);
+  const std::string cells = text.substr(at);
+  CHECK(cells.find("point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]") != std::string::npos);
+  CHECK(cells.find("int4[] tetVertexIndices = [(0, 1, 2, 3)]") != std::string::npos);
+  CHECK(cells.find("int3[] surfaceFaceVertexIndices = [(") != std::string::npos);
+  const VolumeMesh cubes = subvol::test::lattice(1, 1, 1);
+  CHECK(!consists_of_tets(cubes));
+  CHECK_THROWS_AS(usd_text(cube(), {}, {.tets = &cubes}), InputError);
 }
 
 TEST_CASE("a .usda cage beyond single precision is refused") {
