@@ -60,6 +60,8 @@ class RegionFit : AutomaticDriver {
   void find_curves();
   bool run_count(std::size_t cells);
   bool run_smooth(std::size_t cells);
+  bool run_unrefined(std::size_t cells);
+  bool make_pillowed(std::size_t most);
   bool run_curves(std::size_t cells);
   std::optional<VolumeMesh> make_grid(std::size_t cells);
   PillowChoice pillow_choice(const VolumeMesh& grid) const;
@@ -259,30 +261,40 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   return going;
 }
 
+/// Makes the present mesh a pillowed template of at most so many cells, if there is one; returns false if there is none
+/// at all.
+bool RegionFit::make_pillowed(std::size_t most) {
+  constexpr double kRoom = 0.85, kLess = 0.95;
+  constexpr int kTries = 3;
+  double asked = kRoom * static_cast<double>(most);
+  for (int round = 1;; ++round) {
+    const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
+    if (!grid) return false;
+    mesh_ = pillow_regions(*grid, pillow_choice(*grid));
+    const std::size_t got = mesh_.num_cells();
+    if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
+    asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
+  }
+}
+
 /// Fits a pillowed grid that is refined once, unless the regions need too many cells for that.
 bool RegionFit::run_smooth(std::size_t cells) {
-  constexpr double kRoom = 0.85, kLess = 0.95, kMostExcess = 1.4;
-  constexpr int kTries = 3;
-  /// Makes the present mesh a pillowed template of at most so many cells, if there is one; false: none at all.
-  const auto make_template = [&](std::size_t most) {
-    double asked = kRoom * static_cast<double>(most);
-    for (int round = 1;; ++round) {
-      const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
-      if (!grid) return false;
-      mesh_ = pillow_regions(*grid, pillow_choice(*grid));
-      const std::size_t got = mesh_.num_cells();
-      if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
-      asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
-    }
-  };
+  constexpr double kMostExcess = 1.4;
   const std::size_t coarse = std::max(kLeastTemplateCells, cells / kChildren);
-  if (!make_template(coarse)) return !no_template_.empty();
+  if (!make_pillowed(coarse)) return !no_template_.empty();
   int levels = 1;
   if (static_cast<double>(mesh_.num_cells()) > kMostExcess * static_cast<double>(coarse)) {
     levels = 0;
-    if (mesh_.num_cells() < cells / 2 && !make_template(cells)) return !no_template_.empty();
+    if (mesh_.num_cells() < cells / 2 && !make_pillowed(cells)) return !no_template_.empty();
   }
   return fit_and_refine(levels);
+}
+
+/// Fits a pillowed grid that is not refined: places as narrow as a cell have eight times as many cells then.
+bool RegionFit::run_unrefined(std::size_t cells) {
+  layout_.reset();
+  no_template_.clear();
+  return make_pillowed(cells) ? fit_and_refine(0) : !no_template_.empty();
 }
 
 /// Fits a grid whose sheets are routed and padded.
@@ -352,6 +364,10 @@ AutomaticFitResult RegionFit::run() {
   for (std::size_t i = 0; i < counts.size() && going && !is_good(); ++i) {
     begin_attempt();
     going = run_count(counts[i]);
+  }
+  if (going && !is_good() && !follows_edges_ && !options_.cells) {
+    begin_attempt();
+    going = run_unrefined(counts.back());
   }
   if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);
   if (going) going = polish();
