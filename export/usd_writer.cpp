@@ -168,7 +168,7 @@ void append_geometry(std::string& text, const PolygonMesh& cage) {
   points.append_points(text);
 }
 
-/// Appends the cells as a TetMesh. Its tets have a positive volume, and its surface faces outward.
+/// Appends the cells as a TetMesh, with the boundary facing outward.
 void append_tets(std::string& text, const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   const auto tuple = [&](std::span<const Index> corners) {

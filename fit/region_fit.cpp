@@ -40,6 +40,11 @@ using namespace internal;
 
 namespace {
 
+/// A grid is first asked for this share of the cells allowed, so that one that comes out larger still has room; after a
+/// grid that was too large, the next is asked for a little less than would have fitted.
+constexpr double kAskedShare = 0.85, kRetryShare = 0.95;
+constexpr int kGridTries = 3;
+
 RegionSurface normalised(RegionSurface surface, const Normalisation& normalisation) {
   surface.mesh.positions = normalisation.to_unit(std::move(surface.mesh.positions));
   for (double& volume : surface.volumes) volume /= std::pow(normalisation.diagonal, 3);
@@ -81,8 +86,8 @@ class RegionFit : AutomaticDriver {
   void conclude();
 
   const RegionSurface& original_;
-  RegionSurface unit_;                 ///< the target in normalized coordinates
-  ClosestPoint tree_;                  ///< over all its triangles
+  RegionSurface unit_;  ///< the target in normalized coordinates
+  ClosestPoint tree_;   ///< over all its triangles
   bool follows_edges_ = false;
   SheetCurves curves_;                 ///< to follow, if edges are followed
   std::optional<SheetLayout> layout_;  ///< of mesh_; none: sheets correspond as wholes
@@ -108,9 +113,10 @@ std::string crowded_curve(const RegionSurface& target) {
                       regions.insert(region);
                   if (regions.size() <= kMost) return;
                   const Vec3 middle = 0.5 * (target.mesh.positions[edge[0].low] + target.mesh.positions[edge[0].high]);
-                  text = formatted("; %zu regions meet along a curve through (%g, %g, %g), which a grid can follow only "
-                                   "in planes between its cells",
-                                   regions.size(), middle.x(), middle.y(), middle.z());
+                  text = formatted(
+                      "; %zu regions meet along a curve through (%g, %g, %g), which a grid can follow only "
+                      "in planes between its cells",
+                      regions.size(), middle.x(), middle.y(), middle.z());
                 });
   return text;
 }
@@ -131,13 +137,12 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
     std::string names;
     for (const Index r : made.missed) {
       const Group& region = original_.regions[static_cast<std::size_t>(r)];
-      names += (names.empty() ? "" : ", ") +
-               (region.name.empty() ? "region " + std::to_string(region.number) : region.name);
+      names +=
+          (names.empty() ? "" : ", ") + (region.name.empty() ? "region " + std::to_string(region.number) : region.name);
     }
     no_template_ = "target: no grid that was tried, of up to 9 times " + std::to_string(options.cells) +
                    " cells, has the topology of its regions" + (names.empty() ? "" : "; missed: " + names) +
-                   crowded_curve(original_) +
-                   "; ask for more --cells, or give a --template";
+                   crowded_curve(original_) + "; ask for more --cells, or give a --template";
     return std::nullopt;
   }
   VolumeMesh mesh = std::move(made.made->mesh);
@@ -244,8 +249,7 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   if (follows_edges_ && !trial.relaxed_at) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
   restore_volumes(mesh_, unit_.volumes, kLeastAfterVolumes);
   const QualityReport quality = measure_quality(mesh_);
-  const SurfaceDistance outer =
-      target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
+  const SurfaceDistance outer = target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
   const SurfaceDistance inner = target_.interface_distance(mesh_);
   trial.through_planes = template_.through_planes;
   trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
@@ -264,16 +268,14 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
 /// Makes the present mesh a pillowed template of at most so many cells, if there is one; returns false if there is none
 /// at all.
 bool RegionFit::make_pillowed(std::size_t most) {
-  constexpr double kRoom = 0.85, kLess = 0.95;
-  constexpr int kTries = 3;
-  double asked = kRoom * static_cast<double>(most);
+  double asked = kAskedShare * static_cast<double>(most);
   for (int round = 1;; ++round) {
     const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
     if (!grid) return false;
     mesh_ = pillow_regions(*grid, pillow_choice(*grid));
     const std::size_t got = mesh_.num_cells();
-    if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
-    asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
+    if (got <= most || round == kGridTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
+    asked *= kRetryShare * static_cast<double>(most) / static_cast<double>(got);
   }
 }
 
@@ -290,7 +292,7 @@ bool RegionFit::run_smooth(std::size_t cells) {
   return fit_and_refine(levels);
 }
 
-/// Fits a pillowed grid that is not refined: places as narrow as a cell have eight times as many cells then.
+/// Fits a pillowed grid that is not refined, so that the cells of the template itself are small.
 bool RegionFit::run_unrefined(std::size_t cells) {
   layout_.reset();
   no_template_.clear();
@@ -299,9 +301,7 @@ bool RegionFit::run_unrefined(std::size_t cells) {
 
 /// Fits a grid whose sheets are routed and padded.
 bool RegionFit::run_curves(std::size_t cells) {
-  constexpr double kRoom = 0.85, kLess = 0.95;
-  constexpr int kTries = 3;
-  double asked = kRoom * static_cast<double>(cells);
+  double asked = kAskedShare * static_cast<double>(cells);
   for (int round = 1;; ++round) {
     const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
     if (!grid) return !no_template_.empty();
@@ -315,8 +315,8 @@ bool RegionFit::run_curves(std::size_t cells) {
     routing.cancelled = [this] { return runner_.is_to_end(); };
     layout_ = sheet_layout(*grid, mesh_.positions, unit_, curves_, routing, pillow_choice(*grid));
     mesh_ = layout_->tagged_mesh;
-    if (mesh_.num_cells() > cells && options_.cells && round < kTries) {
-      asked *= kLess * static_cast<double>(cells) / static_cast<double>(mesh_.num_cells());
+    if (mesh_.num_cells() > cells && options_.cells && round < kGridTries) {
+      asked *= kRetryShare * static_cast<double>(cells) / static_cast<double>(mesh_.num_cells());
       continue;
     }
     AutomaticFitTrial trial{.template_cells = grid->num_cells(), .pads = layout_->pads.value_or(0)};
@@ -347,9 +347,10 @@ void RegionFit::conclude() {
                                         options_.max_tolerance_percent, kAutomaticVolumePercent) +
                               report.explanation);
   if (template_.wrong_sheets > 0)
-    report.warnings.push_back(formatted("%zu interfaces or parts of the boundary have another topology than in the "
-                                        "target; more --cells may mend that",
-                                        template_.wrong_sheets));
+    report.warnings.push_back(
+        formatted("%zu interfaces or parts of the boundary have another topology than in the "
+                  "target; more --cells may mend that",
+                  template_.wrong_sheets));
   warn_of_missed_edges(result_.missed_edges, chosen.curves, "curves", report);
   mark_if_far_off(result_, options_, "curves");
 }

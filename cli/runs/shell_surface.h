@@ -18,7 +18,7 @@ namespace subvol::cli {
 /// How the surface of a shell is prepared.
 struct ShellSurfaceOptions {
   std::string region;  ///< name or number of the region on whose boundary layers grow; empty: all regions
-  ShellSide side = ShellSide::outward;
+  ShellSide side = ShellSide::outward;  ///< on which layers grow
   std::vector<std::string> skipped;  ///< patches to leave out, each by group or point (`prepared_surface`)
   double repair_distance = 0;        ///< of `mend_surface`, in the surface's unit; 0: it is taken as it is
   std::function<bool()> cancelled;   ///< as in `mend_surface`

@@ -39,7 +39,7 @@ struct PatchedMesh {
   std::vector<PlacedCorner> corners;  ///< ascending by vertex
   BoundaryPatches patches;
   std::vector<EdgeAngle> angles;  ///< of the boundary edges on no path; edges that are missing count as flat
-  /// What lies inside the mesh and moves with its vertices.
+  /// These faces and paths lie inside the mesh and move with its vertices.
   std::vector<InnerFace> inner_faces;
   std::vector<CreasePath> inner_paths;
   /// Pairs of patches that are padded together or not at all, besides those on both sides of a nearly flat path.

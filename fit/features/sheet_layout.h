@@ -32,8 +32,8 @@ struct SheetLayout {
   VolumeMesh tagged_mesh;               ///< the mesh to fit, from its positions, with tags on the edges of the paths
   FollowedCreases creases;              ///< of that mesh
   std::vector<CreaseSegment> segments;  ///< edges of the paths between its vertices, and the curves they follow
-  /// What belongs to each other (`ClosestPointEnergy`): the group of each face of the mesh, by `MeshTopology`, 0 for
-  /// faces inside regions; and of each triangle of the target.
+  /// The faces of a group correspond to the triangles of the same group (`ClosestPointEnergy`). There is one entry per
+  /// face of the mesh, by `MeshTopology`, 0 for faces inside regions, and one per triangle of the target.
   std::vector<Index> group_of_face, group_of_triangle;
 };
 

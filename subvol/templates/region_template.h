@@ -14,7 +14,8 @@ namespace subvol {
 
 struct RegionTemplateOptions {
   std::size_t cells = 300;  ///< approximate number, in [kLeastTemplateCells, kMostTemplateCells]
-  /// The grid is to be given to `pillow_regions`: it can be, and the cells that this adds count toward `cells`.
+  /// Layers are to be put on the sheets of the grid: `pillow_regions` can do so, and the cells that it would add count
+  /// toward `cells`.
   bool for_pillow = false;
   /// Called with the estimated progress in [0, 1], which falls back if a larger count must be tried; returns false to
   /// cancel. Empty: none.
