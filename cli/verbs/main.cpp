@@ -65,19 +65,26 @@ void keep_freed_memory() {
 #endif
 }
 
-/// Starts the program again with settings of OpenMP that its runtime library reads when it is loaded, unless the user
-/// has set them.
+/// Starts the program again with settings that runtime libraries read when they are loaded, unless the user has set
+/// them.
 ///
-/// A thread that waits for others spins first. By default it does so for milliseconds; if another program keeps a
-/// processor busy, this one then takes ten and more times as long. Spinning 1,000 times, a few microseconds, is as fast
-/// on an idle machine.
-void restart_with_short_waits(char** argv) {
+/// * A thread of OpenMP that waits for others spins first. By default it does so for milliseconds; if another program
+///   keeps a processor busy, this one then takes ten and more times as long. Spinning 1,000 times, a few microseconds,
+///   is as fast on an idle machine.
+/// * The C library asks the system for huge pages. Where the system gives them only to programs that ask, fits take a
+///   sixth to a quarter less time with them.
+void restart_with_settings(char** argv) {
 #ifdef __linux__
-  if (std::getenv("OMP_WAIT_POLICY") || std::getenv("GOMP_SPINCOUNT")) return;
+  bool is_new = false;
+  const auto set = [&is_new](const char* name, const char* value) {
+    if (!std::getenv(name) && setenv(name, value, 1) == 0) is_new = true;
+  };
+  if (!std::getenv("OMP_WAIT_POLICY")) set("GOMP_SPINCOUNT", "1000");
+  set("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1");
+  if (!is_new) return;
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error || setenv("GOMP_SPINCOUNT", "1000", 1) != 0) return;
-  execv(program.c_str(), argv);  // returns if the system refuses; then all goes on as it is
+  if (!error) execv(program.c_str(), argv);  // returns if the system refuses; then all goes on as it is
 #endif
 }
 
@@ -103,7 +110,7 @@ int run_to_status(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace subvol::cli;
-  restart_with_short_waits(argv);
+  restart_with_settings(argv);
   keep_freed_memory();
   std::set_new_handler(run_out);
   std::set_terminate(end_in_order);

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program runs with OpenMP threads that spin for a short time, unless the user has said how long they do.
+"""The program runs with OpenMP threads that spin for a short time and with huge pages, unless the user has set these.
 
-    short_waits.py PROGRAM SAMPLES
+    runtime_settings.py PROGRAM SAMPLES
 """
 import os
 import pathlib
@@ -11,7 +11,9 @@ import sys
 import tempfile
 import time
 
-KNOWN = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
+KNOWN = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT", "GLIBC_TUNABLES")
+SPINS = {"GOMP_SPINCOUNT": "1000"}
+HUGE_PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 
 
 def running(program, samples, folder, expected, **settings):
@@ -45,8 +47,11 @@ def main():
         folder = pathlib.Path(folder)
         subprocess.run([writer, folder / "samples"], check=True, stdout=subprocess.DEVNULL)
         own = os.path.basename(program)
-        for settings, expected in (({}, {"GOMP_SPINCOUNT": "1000"}), ({"OMP_WAIT_POLICY": "active"},) * 2,
-                                   ({"GOMP_SPINCOUNT": "7"},) * 2):
+        for settings, expected in (({}, SPINS | HUGE_PAGES),
+                                   ({"OMP_WAIT_POLICY": "active"}, {"OMP_WAIT_POLICY": "active"} | HUGE_PAGES),
+                                   ({"GOMP_SPINCOUNT": "7"}, {"GOMP_SPINCOUNT": "7"} | HUGE_PAGES),
+                                   ({"GLIBC_TUNABLES": "glibc.malloc.hugetlb=0"},
+                                    {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=0"} | SPINS)):
             found = running(program, folder / "samples", folder, (own, expected), **settings)
             if found != (own, expected):
                 print(f"with {settings}: expected {own} with {expected}, found {found}")
