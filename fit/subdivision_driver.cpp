@@ -75,6 +75,7 @@ void SubdivisionDriver::prepare_level() {
   const double begin = runner_.seconds();
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(), finest());
   limit_check_.reset();
+  known_distances_.reset();
   creases_.refine(level_.parent_creases);
   sample_target();
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.surface.volume(),
@@ -184,24 +185,35 @@ bool SubdivisionDriver::start_level() {
 }
 
 TriangleMesh SubdivisionDriver::limit_triangles() {
-  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, kLimitRefinements);
+  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, limit_refinements(level_.mesh));
   return internal::limit_triangles(level_, *limit_check_, from_unknowns_.apply(unknowns_));
 }
 
-/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
-/// element mesh's, of its interfaces', and of the limit surface's.
-double SubdivisionDriver::measured_mean() {
-  if (mean_) return *mean_;
+const std::vector<SurfaceDistance>& SubdivisionDriver::distances(bool extremes) {
+  if (known_distances_ && known_distances_->unknowns == unknowns_ && (known_distances_->extremes || !extremes))
+    return known_distances_->distances;
   const double begin = runner_.seconds();
+  KnownDistances& known = known_distances_.emplace(unknowns_, extremes);
   const VolumeMesh mesh = current_mesh();
-  std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
-  if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
-  double mean = 0;
-  for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
-  if (target_.has_interfaces()) mean = std::max(mean, target_.interface_distance(mesh).mean());
-  mean_ = 100 * mean;
-  if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
+  known.distances.push_back(target_.distance(refined_triangles(boundary_surface(mesh, MeshTopology(mesh))), extremes));
+  if (target_.has_interfaces()) known.distances.push_back(target_.interface_distance(mesh));
+  if (options_.surface == FittedSurface::limit)
+    known.distances.push_back(target_.distance(limit_triangles(), extremes));
   seconds_["distance"] += runner_.seconds() - begin;
+  return known.distances;
+}
+
+void SubdivisionDriver::note_mean(std::span<const SurfaceDistance> distances) {
+  mean_ = 0;
+  for (const SurfaceDistance& distance : distances) mean_ = std::max(*mean_, 100 * distance.mean());
+  if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
+}
+
+/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
+/// element mesh's, of its interfaces', and of the limit surface's. If the quality is to be raised from this state, the
+/// largest distances are needed then, so they are measured at once.
+double SubdivisionDriver::measured_mean() {
+  if (!mean_) note_mean(distances(finest() && options_.quality > 0));
   return *mean_;
 }
 
@@ -261,11 +273,8 @@ std::optional<SubdivisionDriver::Measured> SubdivisionDriver::measure(bool past_
   const std::optional<std::size_t> pairs =
       past_limit ? self_intersections(surface).pairs.size() : runner_.intersecting_pairs(surface, result_.report);
   if (!pairs) return std::nullopt;
-  Measured result{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, {}};
-  result.distances.push_back(target_.distance(surface));
-  if (target_.has_interfaces()) result.distances.push_back(target_.interface_distance(mesh));
-  if (options_.surface == FittedSurface::limit) result.distances.push_back(target_.distance(limit_triangles()));
-  return result;
+  note_mean(distances(true));
+  return Measured{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, distances(true)};
 }
 
 bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {

@@ -18,6 +18,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -81,16 +82,16 @@ class SubdivisionDriver : protected StagedFit {
   FitReport& report() override { return result_.report; }
 
   FitOptions options_;
-  FitTarget target_;               ///< sampled for the current level
-  VolumeMesh template_;            ///< normalized, with its creases
-  VolumeMesh cage_;                ///< the mesh whose vertices are the degrees of freedom
+  FitTarget target_;     ///< sampled for the current level
+  VolumeMesh template_;  ///< normalized, with its creases
+  VolumeMesh cage_;      ///< the mesh whose vertices are the degrees of freedom
   std::vector<Vec3> unknowns_;
-  int try_ = 0;                    ///< number of attempts begun, each with other ideal cells
+  int try_ = 0;  ///< number of attempts begun, each with other ideal cells
   FitSchedule schedule_;
-  int number_ = 0;                 ///< level of the finite element mesh
+  int number_ = 0;  ///< level of the finite element mesh
   FitLevel level_;
   FitResult result_;
-  StageRange result_stages_;       ///< the stages that led to the state stored in result_
+  StageRange result_stages_;  ///< the stages that led to the state stored in result_
   std::map<std::string, double> seconds_;
   MemoryBudget memory_;
   StageRunner runner_;
@@ -101,16 +102,28 @@ class SubdivisionDriver : protected StagedFit {
   std::string stage_name(const Stage& stage) const;
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   TriangleMesh limit_triangles();
+  /// Returns the distances between the target and the current state: of the finite element mesh, of its interfaces, and
+  /// of the limit surface. `extremes`: with the largest ones.
+  const std::vector<SurfaceDistance>& distances(bool extremes);
+  /// Notes the mean distance of the current state.
+  void note_mean(std::span<const SurfaceDistance> distances);
 
-  bool samples_all_ = true;                     ///< false: only some of the target's samples are used
-  VolumeMesh control_;                          ///< the control mesh (for cage-only fits, its last refinement)
-  FollowedCreases template_creases_, creases_;  ///< creases of template_ and of level_.mesh
-  SparseMap from_unknowns_;                     ///< maps the degrees of freedom to control_'s vertices
-  SparseMap previous_nodes_;                    ///< maps them to the nodes of the last certified finite element mesh
-  double own_box_share_ = 0;                    ///< of the current attempt
-  std::vector<Vec3> ideal_boxes_;               ///< of the current level's cells
+  /// Distances that were measured, and the degrees of freedom that they belong to.
+  struct KnownDistances {
+    std::vector<Vec3> unknowns;
+    bool extremes;
+    std::vector<SurfaceDistance> distances;
+  };
+  std::optional<KnownDistances> known_distances_;  ///< on the current level
+  bool samples_all_ = true;                        ///< false: only some of the target's samples are used
+  VolumeMesh control_;                             ///< the control mesh (for cage-only fits, its last refinement)
+  FollowedCreases template_creases_, creases_;     ///< creases of template_ and of level_.mesh
+  SparseMap from_unknowns_;                        ///< maps the degrees of freedom to control_'s vertices
+  SparseMap previous_nodes_;                       ///< maps them to the nodes of the last certified finite element mesh
+  double own_box_share_ = 0;                       ///< of the current attempt
+  std::vector<Vec3> ideal_boxes_;                  ///< of the current level's cells
   std::optional<BoundaryRefinement> limit_check_;  ///< refinement of level_.mesh, made when first needed
-  std::size_t try_begin_ = 0;                   ///< number of stages in the report when the attempt began
+  std::size_t try_begin_ = 0;                      ///< number of stages in the report when the attempt began
 };
 
 }  // namespace subvol::internal

@@ -111,14 +111,16 @@ void ClosestPointEnergy::emphasize_far(double length) {
 }
 
 void ClosestPointEnergy::set_groups(std::vector<Index> of_triangle, std::span<const Index> of_target) {
-  if (target_->is_cloud() || of_triangle.size() != triangles().size() || of_target.size() != target_->triangles().size())
+  if (target_->is_cloud() || of_triangle.size() != triangles().size() ||
+      of_target.size() != target_->triangles().size())
     throw InputError("ClosestPointEnergy: one group is expected for each triangle of both surfaces");
   groups_ = std::move(of_triangle);
   sample_groups_.clear();
   for (const Index t : target_->sample_triangles()) sample_groups_.push_back(of_target[t]);
-  target_tree_ = std::make_shared<const GroupedClosestPoint>(
-      TriangleMesh{target_->positions(), target_->triangles()}, of_target);
-  surface_tree_.reset();
+  target_tree_ =
+      std::make_shared<const GroupedClosestPoint>(TriangleMesh{target_->positions(), target_->triangles()}, of_target);
+  is_found_ = false;
+  is_forgotten_ = true;
 }
 
 void ClosestPointEnergy::weigh(std::vector<double> factors) {
@@ -140,11 +142,21 @@ void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
     offset += points;
   }
   surface_offsets_.back() = offset;
-  surface_hints_.clear();
+  surface_hits_.clear();
+  is_found_ = false;
 }
 
-void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
-  const bool straight = pull_ == SurfacePull::straight_both_ways;
+void ClosestPointEnergy::begin_search() {
+  if (is_forgotten_) {
+    surface_tree_.reset();
+    target_hits_.clear();
+    surface_hits_.clear();
+  }
+  is_fresh_ = std::exchange(is_forgotten_, false);
+  is_found_ = false;
+}
+
+void ClosestPointEnergy::find_target(std::span<const Vec3> samples) {
   const std::vector<Vec3>& points = is_part_ ? used_points_ : target_->samples();
   if (surface_tree_) {
     surface_tree_->move(samples);
@@ -154,6 +166,11 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
     target_hits_.resize(points.size());
   }
   surface_tree_->closest(points, sample_groups_, target_hits_);
+}
+
+void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
+  const bool straight = pull_ == SurfacePull::straight_both_ways;
+  const std::vector<Vec3>& points = is_part_ ? used_points_ : target_->samples();
   target_offsets_.assign(triangles().size() + 1, 0);
   for (const auto& hit : target_hits_) ++target_offsets_[hit.triangle + 1];
   for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
@@ -188,10 +205,10 @@ double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::
   return near * near * along * along;
 }
 
-void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
+void ClosestPointEnergy::link_surface(std::span<const Vec3> samples, bool finds) {
   if (!target_tree_) return;
   surface_links_.resize(surface_offsets_.back());
-  surface_hints_.resize(surface_links_.size(), kNoIndex);
+  surface_hits_.resize(surface_links_.size());
   surface_distances_.resize(surface_links_.size());
   const bool straight = pull_ != SurfacePull::along_normals;
 #pragma omp parallel for schedule(static)
@@ -205,12 +222,16 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
     for (std::size_t k = 0; k < n; ++k) {
       const std::array<double, 3>& l = points[k];
       const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
-      Index& hint = surface_hints_[begin + k];
-      const ClosestPoint::Hit hit = target_tree_->closest(x, group(t), hint == kNoIndex ? before : hint);
-      hint = before = hit.triangle;
+      ClosestPoint::Hit& hit = surface_hits_[begin + k];
+      if (finds) hit = target_tree_->closest(x, group(t), hit.triangle == kNoIndex ? before : hit.triangle);
+      before = hit.triangle;
       Link& link = surface_links_[begin + k];
-      link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
-              factor(static_cast<Index>(t)) * emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
+      link = {static_cast<Index>(t),
+              l,
+              hit.point,
+              target_->normals()[hit.triangle],
+              factor(static_cast<Index>(t)) * emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n),
+              tau_};
       if (discounts_ && own_normal.dot(link.normal) < kAgreement) link.weight *= kDiscount;
       surface_distances_[begin + k] = hit.distance;
       if (!over_rim(hit)) {
@@ -244,9 +265,15 @@ void ClosestPointEnergy::add_link(const Link& link, const Incidence& incidence, 
 }
 
 void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
+  const bool finds = !is_found_ || (is_forgotten_ && !is_fresh_) || !std::ranges::equal(samples, assigned());
   begin_assign(samples);
+  if (finds) {
+    begin_search();
+    find_target(samples);
+  }
   link_target(samples);
-  link_surface(samples);
+  link_surface(samples, finds);
+  is_found_ = true;
   assemble(scale_, [this](std::size_t i, Row& row) {
     for (const Incidence& incidence : incidences(i)) {
       const auto t = static_cast<std::size_t>(incidence.triangle);
@@ -259,11 +286,13 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
   });
 }
 
-void ClosestPointEnergy::forget() {
-  surface_tree_.reset();
-  target_hits_.clear();
-  surface_hints_.clear();
+void ClosestPointEnergy::assign_target(std::span<const Vec3> samples) {
+  begin_search();
+  find_target(samples);
+  link_target(samples);
 }
+
+void ClosestPointEnergy::forget() { is_forgotten_ = true; }
 
 ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
   double to_surface = 0, to_target = 0, area = 0, max = 0;

@@ -86,13 +86,13 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// InputError; must be called before `assign`.
   void refine(std::span<const std::uint8_t> triangles);
 
-  /// Cost: one closest-point query per target sample and per quadrature point. Each search starts from the answer of
-  /// the previous call, and the tree over S~ is refitted.
+  /// Cost: one closest-point query per target sample and per quadrature point; none if the samples are those of the
+  /// last call. Each search starts from the answer of the previous call, and the tree over S~ is refitted.
   void assign(std::span<const Vec3> samples) override;
   void forget() override;
   /// Finds the correspondences of the target's points only: all that the energies of parts take from this one. `assign`
   /// must follow before anything else is asked for.
-  void assign_target(std::span<const Vec3> samples) { link_target(samples); }
+  void assign_target(std::span<const Vec3> samples);
 
   /// Distances between the surfaces at the last `assign`, each the larger of both directions; means are weighted by
   /// area. Points over a boundary of the target count as distance 0.
@@ -118,34 +118,42 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// Returns the place of a used point of the target in its samples.
   std::size_t target_point(std::size_t j) const { return is_part_ ? static_cast<std::size_t>(used_[j]) : j; }
 
+  /// Prepares a search for closest points, without memory of earlier ones if they are to be forgotten.
+  void begin_search();
+  /// Finds s(y_j) for all samples of the target.
+  void find_target(std::span<const Vec3> samples);
   void link_target(std::span<const Vec3> samples);
-  void link_surface(std::span<const Vec3> samples);
+  /// finds  false: t(x_q) is known for these samples.
+  void link_surface(std::span<const Vec3> samples, bool finds);
   bool over_rim(const ClosestPoint::Hit& hit) const;
   double share_over_rim(const Link& link, const ClosestPoint::Hit& hit, std::span<const Vec3> samples) const;
   void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
 
   const TargetSurface* target_;
   std::shared_ptr<const GroupedClosestPoint> target_tree_;  ///< null for a cloud
-  std::optional<GroupedClosestPoint> surface_tree_;  ///< tree over S~
-  std::vector<Index> groups_, sample_groups_;        ///< of each sample triangle and target sample; empty: no groups
+  std::optional<GroupedClosestPoint> surface_tree_;         ///< tree over S~
+  std::vector<Index> groups_, sample_groups_;  ///< of each sample triangle and target sample; empty: no groups
   Index group(std::size_t triangle) const { return groups_.empty() ? 0 : groups_[triangle]; }
-  bool is_part_ = false;                           ///< only the target's samples in used_ count
+  bool is_part_ = false;  ///< only the target's samples in used_ count
   std::vector<Index> used_;
-  std::vector<Vec3> used_points_;                  ///< their positions
-  std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
+  std::vector<Vec3> used_points_;               ///< their positions
+  std::vector<ClosestPoint::Hit> target_hits_;  ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 
   double tau_, scale_, inverse_far_ = 0;
   SurfacePull pull_;
   bool discounts_ = false;
-  std::vector<double> factors_;              ///< per sample triangle; empty: all 1
+  std::vector<double> factors_;  ///< per sample triangle; empty: all 1
   double factor(Index triangle) const { return factors_.empty() ? 1 : factors_[triangle]; }
-  std::vector<Link> target_links_;           ///< ordered by sample triangle
-  std::vector<std::size_t> target_offsets_;  ///< where each sample triangle begins in target_links_
-  std::vector<Link> surface_links_;          ///< ordered by sample triangle
-  std::vector<std::size_t> surface_offsets_; ///< where each sample triangle begins in surface_links_
-  std::vector<Index> surface_hints_;         ///< target triangles of t(x_q)
-  std::vector<double> surface_distances_;    ///< |x_q - t(x_q)|
+  std::vector<Link> target_links_;               ///< ordered by sample triangle
+  std::vector<std::size_t> target_offsets_;      ///< where each sample triangle begins in target_links_
+  std::vector<Link> surface_links_;              ///< ordered by sample triangle
+  std::vector<std::size_t> surface_offsets_;     ///< where each sample triangle begins in surface_links_
+  std::vector<ClosestPoint::Hit> surface_hits_;  ///< t(x_q)
+  std::vector<double> surface_distances_;        ///< |x_q - t(x_q)|; 0 over a boundary
+  bool is_found_ = false;                        ///< the closest points are those of the assigned samples
+  bool is_fresh_ = false;                        ///< they were found without memory of earlier ones
+  bool is_forgotten_ = true;                     ///< the next search must not remember earlier ones
 };
 
 }  // namespace subvol::internal

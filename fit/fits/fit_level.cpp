@@ -137,6 +137,13 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   return level;
 }
 
+int limit_refinements(const VolumeMesh& mesh) {
+  constexpr int kMost = 2;
+  constexpr std::size_t kMostTriangles = 200000;
+  const std::size_t of_two = MeshTopology(mesh).boundary_faces().size() * 2 << 2 * kMost;
+  return of_two > kMostTriangles ? kMost - 1 : kMost;
+}
+
 TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control) {
   TriangleMesh surface;
   surface.positions = limit.positions.apply(level.refine.apply(control));

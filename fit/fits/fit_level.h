@@ -25,15 +25,15 @@ namespace subvol::internal {
 /// target and no tolerance is given, N lies on the limit surface alone. For FittedSurface::mesh, the samples are the
 /// boundary vertices of the mesh.
 struct FitLevel {
-  VolumeMesh mesh;               ///< the finite element mesh: hexes
-  SparseMap refine;              ///< S alone: maps control vertices to the vertices of the next control mesh
-  SparseMap nodes;               ///< M
-  SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid if that mesh is certified
-  SparseMap samples;             ///< N
+  VolumeMesh mesh;       ///< the finite element mesh: hexes
+  SparseMap refine;      ///< S alone: maps control vertices to the vertices of the next control mesh
+  SparseMap nodes;       ///< M
+  SparseMap safe_nodes;  ///< linear split of the previous level's nodes: valid if that mesh is certified
+  SparseMap samples;     ///< N
   std::vector<std::array<Index, 3>> sample_triangles;
   std::vector<Index> sample_faces;  ///< face of the mesh of each of these triangles, as MeshTopology numbers it
-  /// Interfaces between regions are sampled like the boundary. Group of each face of the mesh (`groups_of_sheets`) and of
-  /// each sample triangle, and the faces of interfaces; empty without interfaces.
+  /// Interfaces between regions are sampled like the boundary. Group of each face of the mesh (`groups_of_sheets`) and
+  /// of each sample triangle, and the faces of interfaces; empty without interfaces.
   std::vector<Index> face_groups, sample_groups, interfaces;
   /// Edges between samples along the creases of the mesh, in the order of its tags, with the same number for each
   /// crease.
@@ -59,8 +59,9 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
 /// control  positions of the vertices of the control mesh.
 TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control);
 
-/// Number of refinements beyond a level's mesh by which its limit surface is measured: its chord error is then a
-/// sixteenth of the mesh's.
-inline constexpr int kLimitRefinements = 2;
+/// Returns the number of refinements beyond a level's mesh by which its limit surface is measured: two, by which the
+/// chord error is a sixteenth of the mesh's, or one if the mesh is so fine that two would give more triangles than the
+/// distances can be sensitive to.
+int limit_refinements(const VolumeMesh& mesh);
 
 }  // namespace subvol::internal

@@ -224,7 +224,7 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
-  surface_->forget();
+  if (!patch_mesh_) surface_->forget();  // the fit may be resumed from here, but not within a patch
   surface_->assign(samples);
   std::vector<double> shares = surface_->triangle_distances_with_corners();
   for (double& share : shares) share /= schedule.most_distance;

@@ -183,7 +183,7 @@ void FitTarget::sample(std::size_t num_samples, std::size_t least, std::size_t m
   surface.thin(most);
 }
 
-SurfaceDistance FitTarget::measure(const TriangleMesh& fitted, bool extremes) const {
+SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, bool extremes) const {
   const ClosestPoint fitted_tree(fitted);
   return tree ? surface_distance(fitted, fitted_tree, mesh, *tree, {.extremes = extremes})
               : surface_distance(fitted_tree, surface.samples());
