@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -276,8 +277,11 @@ ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
       squared[c] = sum;
     }
     const int first = top;
-    for (int c = 0; c < kWidth; ++c) {
-      if (!(squared[c] <= best_squared) || node.child[c] == kNoIndex) continue;
+    unsigned near = 0;
+    for (int c = 0; c < kWidth; ++c) near |= static_cast<unsigned>(squared[c] <= best_squared) << c;
+    for (; near != 0; near &= near - 1) {
+      const int c = std::countr_zero(near);
+      if (node.child[c] == kNoIndex) continue;
       int at = top++;  // the farthest first, so that the closest is taken next
       for (; at > first && stack[at - 1].squared < squared[c]; --at) stack[at] = stack[at - 1];
       stack[at] = {squared[c], node.child[c], node.is_leaf[c]};

@@ -5,10 +5,15 @@
 #include "subvol/fit/geometry/closest_point.h"
 
 #include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace subvol {
 
@@ -17,6 +22,7 @@ namespace {
 struct OneSided {
   double mean = 0;
   SurfaceDistance::Extreme max;
+  bool is_set = false;  ///< false: there is no distance yet
 };
 
 double area_of(const TriangleMesh& mesh, Index t) {
@@ -24,43 +30,86 @@ double area_of(const TriangleMesh& mesh, Index t) {
   return 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
 }
 
-/// Returns, per place in `order`, the corners (bits 0-2) and edges (bits 3-5) that no earlier triangle has.
-std::vector<std::uint8_t> first_uses(const TriangleMesh& mesh, std::span<const Index> order) {
-  std::vector<std::uint8_t> uses(order.size(), 0);
-  std::vector<char> seen(mesh.positions.size(), 0);
-  struct Edge {
-    std::uint64_t key;
-    Index place;
-    int local;
+/// Where a surface is sampled. Triangles are named by their places in an order in which neighbors are close in space.
+struct Samples {
+  struct Vertex {
+    Index number;
+    double area;  ///< that it stands for
   };
-  std::vector<Edge> edges;
-  edges.reserve(3 * order.size());
-  for (std::size_t place = 0; place < order.size(); ++place)
+  struct Edge {
+    Index place;
+    int corner;  ///< the edge leads from this corner to the next one
+  };
+  std::vector<int> cuts;  ///< m of each triangle; 0 if only its corners are sampled
+  std::vector<Vertex> vertices;
+  std::vector<Edge> edges;  ///< whose midpoints are sampled
+  double area = 0;          ///< of all triangles
+};
+
+/// Returns the edges of the triangles that are cut, each once, in ascending order of their places.
+std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const Index> order, std::span<const int> cuts) {
+  struct Keyed {
+    std::uint64_t key;
+    Samples::Edge edge;
+  };
+  std::vector<Keyed> all;
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    if (cuts[place] == 0) continue;
     for (int k = 0; k < 3; ++k) {
-      const Index v = mesh.triangles[order[place]][k], w = mesh.triangles[order[place]][(k + 1) % 3];
-      if (!seen[v]) uses[place] |= 1 << k;
-      seen[v] = 1;
-      const auto [low, high] = std::minmax(v, w);
-      edges.push_back({static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high),
-                       static_cast<Index>(place), k});
+      const auto& corners = mesh.triangles[order[place]];
+      const auto [low, high] = std::minmax(corners[k], corners[(k + 1) % 3]);
+      all.push_back(
+          {static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high), {static_cast<Index>(place), k}});
     }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-    return a.key != b.key ? a.key < b.key : a.place != b.place ? a.place < b.place : a.local < b.local;
-  });
-  for (std::size_t i = 0; i < edges.size(); ++i)
-    if (i == 0 || edges[i].key != edges[i - 1].key) uses[edges[i].place] |= 8 << edges[i].local;
-  return uses;
+  }
+  const auto at = [](const Samples::Edge& edge) { return std::pair(edge.place, edge.corner); };
+  std::sort(all.begin(), all.end(),
+            [&](const Keyed& a, const Keyed& b) { return a.key != b.key ? a.key < b.key : at(a.edge) < at(b.edge); });
+  std::vector<Samples::Edge> edges;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (i == 0 || all[i].key != all[i - 1].key) edges.push_back(all[i].edge);
+  std::sort(edges.begin(), edges.end(), [&](const Samples::Edge& a, const Samples::Edge& b) { return at(a) < at(b); });
+  return edges;
 }
 
-/// Sums up the distances from some consecutive triangles of one surface.
+Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const SurfaceDistanceOptions& options) {
+  constexpr double kLeastShare = 0.5;  // of the area that a sample stands for; smaller triangles have none of their own
+  Samples samples;
+  std::vector<double> areas(order.size());
+  for (std::size_t place = 0; place < order.size(); ++place) samples.area += areas[place] = area_of(mesh, order[place]);
+  std::vector<double> of_vertex(mesh.positions.size(), 0);
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const double share = samples.area > 0 ? options.num_samples * (areas[place] / samples.area) : 0;
+    const bool is_small = order.size() > static_cast<std::size_t>(options.num_samples) && share < kLeastShare;
+    samples.cuts.push_back(is_small ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(share)))));
+    if (is_small)
+      for (const Index v : mesh.triangles[order[place]]) of_vertex[v] += areas[place] / 3;
+  }
+  std::vector<char> seen(mesh.positions.size(), 0);
+  for (const Index t : order)
+    for (const Index v : mesh.triangles[t])
+      if (!std::exchange(seen[v], 1) && (options.extremes || of_vertex[v] > 0))
+        samples.vertices.push_back({v, of_vertex[v]});
+  if (options.extremes) samples.edges = edges_of(mesh, order, samples.cuts);
+  return samples;
+}
+
+/// Sums up the distances of some consecutive samples of one surface.
 class Sampler {
  public:
-  Sampler(const TriangleMesh& mesh, const ClosestPoint& other) : mesh_(mesh), other_(other) {}
+  explicit Sampler(const ClosestPoint& other) : other_(other) {}
 
-  void add_triangle(Index t, double area, int m, int first_use) {
-    const Vec3 a = mesh_.positions[mesh_.triangles[t][0]], b = mesh_.positions[mesh_.triangles[t][1]],
-               c = mesh_.positions[mesh_.triangles[t][2]];
-    const auto at = [&](double u, double v) { return Vec3(a + u * (b - a) + v * (c - a)); };
+  double distance(const Vec3& p) {
+    const ClosestPoint::Hit hit = other_.closest(p, hint_);
+    hint_ = hit.triangle;
+    if (hit.distance > result.max.distance || !result.is_set) result.max = {hit.distance, p, hit.point};
+    result.is_set = true;
+    return hit.distance;
+  }
+
+  /// Adds the centroids of the m^2 parts of a triangle.
+  void add_triangle(const std::array<Vec3, 3>& x, double area, int m) {
+    const auto at = [&](double u, double v) { return Vec3(x[0] + u * (x[1] - x[0]) + v * (x[2] - x[0])); };
     double sum = 0;
     for (int i = 0; i < m; ++i)
       for (int j = 0; i + j < m; ++j) {
@@ -68,54 +117,66 @@ class Sampler {
         if (i + j + 1 < m) sum += distance(at((i + 2 / 3.0) / m, (j + 2 / 3.0) / m));
       }
     result.mean += area * sum / (static_cast<double>(m) * m);
-    const Vec3 corners[3] = {a, b, c};
-    for (int k = 0; k < 3; ++k) {
-      if (first_use & 1 << k) distance(corners[k]);
-      if (first_use & 8 << k) distance(0.5 * (corners[k] + corners[(k + 1) % 3]));
-    }
   }
 
   OneSided result;  ///< `mean` is still the integral, not divided by the area
 
  private:
-  double distance(const Vec3& p) {
-    const ClosestPoint::Hit hit = other_.closest(p, hint_);
-    hint_ = hit.triangle;
-    if (hit.distance > result.max.distance || any_++ == 0) result.max = {hit.distance, p, hit.point};
-    return hit.distance;
-  }
-
-  const TriangleMesh& mesh_;
   const ClosestPoint& other_;
   Index hint_ = kNoIndex;
-  int any_ = 0;
 };
+
+/// Calls add(sampler, i) for all i < n and adds the results up. Sums and hints stay within a run, whatever thread takes
+/// it.
+template <class Add>
+void sample(std::size_t n, const ClosestPoint& to, const Add& add, OneSided& result) {
+  constexpr std::size_t kRun = 128;
+  std::vector<OneSided> runs((n + kRun - 1) / kRun);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    Sampler sampler(to);
+    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, n); ++i) add(sampler, i);
+    runs[run] = sampler.result;
+  }
+  for (const OneSided& run : runs) {
+    result.mean += run.mean;
+    if (!run.is_set || (result.is_set && run.max.distance <= result.max.distance)) continue;
+    result.max = run.max;
+    result.is_set = true;
+  }
+}
 
 OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const ClosestPoint& to,
                    const SurfaceDistanceOptions& options) {
-  std::vector<double> areas(order.size());
-  double total = 0;
-  for (std::size_t place = 0; place < order.size(); ++place) total += areas[place] = area_of(from, order[place]);
-  const std::vector<std::uint8_t> uses =
-      options.extremes ? first_uses(from, order) : std::vector<std::uint8_t>(order.size(), 0);
-  constexpr std::size_t kRun = 32;  // sums and hints stay within a run, whatever thread takes it
-  std::vector<OneSided> runs((order.size() + kRun - 1) / kRun);
-#pragma omp parallel for schedule(dynamic)
-  for (std::size_t run = 0; run < runs.size(); ++run) {
-    Sampler sampler(from, to);
-    for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, order.size()); ++place) {
-      const double share = total > 0 ? areas[place] / total : 0;
-      const int m = std::max(1, static_cast<int>(std::lround(std::sqrt(options.num_samples * share))));
-      sampler.add_triangle(order[place], areas[place], m, uses[place]);
-    }
-    runs[run] = sampler.result;
-  }
+  const Samples samples = samples_of(from, order, options);
+  const auto corners = [&](Index place) {
+    const auto& [a, b, c] = from.triangles[order[place]];
+    return std::array{from.positions[a], from.positions[b], from.positions[c]};
+  };
   OneSided result;
-  for (const OneSided& run : runs) {
-    result.mean += run.mean;
-    if (&run == runs.data() || run.max.distance > result.max.distance) result.max = run.max;
-  }
-  result.mean = total > 0 ? result.mean / total : 0;
+  sample(
+      order.size(), to,
+      [&](Sampler& sampler, std::size_t place) {
+        if (samples.cuts[place] == 0) return;
+        sampler.add_triangle(corners(static_cast<Index>(place)), area_of(from, order[place]), samples.cuts[place]);
+      },
+      result);
+  sample(
+      samples.vertices.size(), to,
+      [&](Sampler& sampler, std::size_t i) {
+        const auto& [number, area] = samples.vertices[i];
+        sampler.result.mean += area * sampler.distance(from.positions[number]);
+      },
+      result);
+  sample(
+      samples.edges.size(), to,
+      [&](Sampler& sampler, std::size_t i) {
+        const auto& [place, corner] = samples.edges[i];
+        const std::array<Vec3, 3> x = corners(place);
+        sampler.distance(0.5 * (x[corner] + x[(corner + 1) % 3]));
+      },
+      result);
+  result.mean = samples.area > 0 ? result.mean / samples.area : 0;
   return result;
 }
 

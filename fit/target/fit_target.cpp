@@ -29,7 +29,7 @@ PointCloud normalised(const PointCloud& cloud, const Normalisation& normalisatio
 }  // namespace
 
 Normalisation::Normalisation(const TriangleMesh& target) {
-  centre = TargetSurface(target).centre();
+  centre = TargetSurface::centre_of(target);
   diagonal = bounding_box_diagonal(target);
   if (!(diagonal > 0) || !std::isfinite(diagonal))
     throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");

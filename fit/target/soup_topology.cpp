@@ -67,10 +67,27 @@ void for_each_edge(std::span<const HalfEdge> half_edges, const Visit& visit) {
   }
 }
 
+/// Returns the parts of each triangle on the boundary, as `soup_topology` describes them.
+std::vector<std::uint8_t> parts_on_rim(std::span<const HalfEdge> half_edges, std::size_t num_vertices,
+                                       std::size_t num_triangles) {
+  std::vector<std::uint8_t> parts(num_triangles, 0);
+  std::vector<char> on_rim(num_vertices, 0);
+  for_each_edge(half_edges, [&](std::span<const HalfEdge> edge) {
+    if (edge.size() > 1) return;
+    on_rim[edge[0].low] = on_rim[edge[0].high] = 1;
+    parts[edge[0].triangle] |= static_cast<std::uint8_t>(1 << edge[0].corner);
+  });
+  for (const HalfEdge& h : half_edges)
+    if (on_rim[h.forward ? h.low : h.high]) parts[h.triangle] |= static_cast<std::uint8_t>(8 << h.corner);
+  return parts;
+}
+
 }  // namespace
 
-SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
+SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
+                           std::vector<std::uint8_t>* rim_parts) {
   const std::vector<HalfEdge> half_edges = sorted_half_edges(positions, triangles);
+  if (rim_parts) *rim_parts = parts_on_rim(half_edges, positions.size(), triangles.size());
   if (half_edges.empty()) return {};
   SoupTopology result;
   std::vector<char> used(positions.size(), 0);
@@ -91,20 +108,6 @@ SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std:
   result.closed_share = static_cast<double>(matched) / static_cast<double>(half_edges.size());
   result.euler_number = std::count(used.begin(), used.end(), 1) - num_edges + num_triangles;
   return result;
-}
-
-std::vector<std::uint8_t> rim_parts(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
-  const std::vector<HalfEdge> half_edges = sorted_half_edges(positions, triangles);
-  std::vector<std::uint8_t> parts(triangles.size(), 0);
-  std::vector<char> on_rim(positions.size(), 0);
-  for_each_edge(half_edges, [&](std::span<const HalfEdge> edge) {
-    if (edge.size() > 1) return;
-    on_rim[edge[0].low] = on_rim[edge[0].high] = 1;
-    parts[edge[0].triangle] |= static_cast<std::uint8_t>(1 << edge[0].corner);
-  });
-  for (const HalfEdge& h : half_edges)
-    if (on_rim[h.forward ? h.low : h.high]) parts[h.triangle] |= static_cast<std::uint8_t>(8 << h.corner);
-  return parts;
 }
 
 }  // namespace subvol

@@ -24,11 +24,10 @@ struct SoupTopology {
   std::size_t crowded_edges = 0;  ///< non-manifold: of three triangles or more
 };
 
-SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
-
-/// Returns, per triangle, its parts on the boundary: bit k is set if its edge from corner k to corner k + 1 is a
-/// boundary edge, bit 3 + k if its corner k is the end of a boundary edge, its own or another triangle's. 0 for ignored
-/// triangles.
-std::vector<std::uint8_t> rim_parts(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
+/// rim_parts  if given, is set to the parts of each triangle on the boundary: bit k is set if its edge from corner k to
+///            corner k + 1 is a boundary edge, bit 3 + k if its corner k is the end of a boundary edge, its own or
+///            another triangle's. 0 for ignored triangles.
+SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
+                           std::vector<std::uint8_t>* rim_parts = nullptr);
 
 }  // namespace subvol

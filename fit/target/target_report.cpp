@@ -34,7 +34,7 @@ TargetReport describe_target(const TargetSurface& target, const TriangleMesh& bo
     report.num_points = target.samples().size();
     return report;
   }
-  report.edges = soup_topology(target.positions(), target.triangles());
+  report.edges = target.edges();
   if (report.edges.open_edges > 0 || report.edges.crowded_edges > 0) return report;
   report.topology = betti_numbers({target.positions(), target.triangles()});
   if (report.topology) report.template_topology = betti_numbers(boundary);

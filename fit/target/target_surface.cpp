@@ -51,9 +51,9 @@ double mended_volume(std::span<const Vec3> positions, std::span<const std::array
   }
 }
 
-Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double area) {
+Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double area,
+                   double closed_share) {
   const double bound = isoperimetric_bound(area);
-  const double closed_share = soup_topology(positions, triangles).closed_share;
   const double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
   if (closed_share == 1 && sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
   if (const double mended = mended_volume(positions, triangles); mended > kFlatness * bound && mended <= bound)
@@ -88,8 +88,8 @@ const char* to_string(VolumeSource source) {
   return "unknown";
 }
 
-TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options)
-    : positions_(mesh.positions) {
+void TargetSurface::take_triangles(const TriangleMesh& mesh) {
+  positions_ = mesh.positions;
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& corners = mesh.triangles[t];
@@ -114,11 +114,21 @@ TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOption
   }
   if (triangles_.empty()) throw InputError("target: no triangle has an area");
   set_box(low, high);  // positions that no triangle uses are ignored
-  rim_parts_ = rim_parts(positions_, triangles_);
+}
+
+Vec3 TargetSurface::centre_of(const TriangleMesh& mesh) {
+  TargetSurface surface;
+  surface.take_triangles(mesh);
+  return surface.centre();
+}
+
+TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options) {
+  take_triangles(mesh);
+  edges_ = soup_topology(positions_, triangles_, &rim_parts_);
   if (options.volume != 0) {
     set_volume(options.volume);
   } else {
-    const Volume volume = find_volume(positions_, triangles_, area_);
+    const Volume volume = find_volume(positions_, triangles_, area_, edges_.closed_share);
     volume_ = volume.value;
     volume_source_ = volume.source;
   }

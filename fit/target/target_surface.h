@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "subvol/surface/point_cloud.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -55,6 +56,9 @@ class TargetSurface {
   /// InputError: as for `cloud_geometry`.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
 
+  /// Returns the center of the bounding box that the target made of a surface has. InputError: as the constructor.
+  static Vec3 centre_of(const TriangleMesh& mesh);
+
   /// True if there are only points: no triangles, nothing to integrate over.
   bool is_cloud() const { return triangles_.empty(); }
   const std::vector<Vec3>& positions() const { return positions_; }
@@ -62,6 +66,8 @@ class TargetSurface {
   /// Unit normal of each triangle, oriented by the order of its corners, and its area.
   const std::vector<Vec3>& normals() const { return normals_; }
   const std::vector<double>& areas() const { return areas_; }
+  /// Topology of the triangles; empty for a cloud.
+  const SoupTopology& edges() const { return edges_; }
   /// True if a triangle has a boundary edge, or a corner on one.
   bool has_rim(Index triangle) const { return rim_parts_[triangle] != 0; }
   /// True if a point of a triangle, given by its barycentric coordinates, lies on a boundary edge. A place whose
@@ -100,6 +106,9 @@ class TargetSurface {
   void thin(std::size_t most);
 
  private:
+  TargetSurface() = default;
+  /// Takes the triangles that have an area.
+  void take_triangles(const TriangleMesh& mesh);
   void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
   void set_box(const Vec3& low, const Vec3& high);
 
@@ -107,6 +116,7 @@ class TargetSurface {
   std::vector<Vec3> positions_, normals_, samples_, sample_normals_;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<double> areas_, sample_areas_;
+  SoupTopology edges_;
   std::vector<std::uint8_t> rim_parts_;
   std::vector<Index> sample_triangles_;
   double area_ = 0, volume_ = 0, diagonal_ = 0;
