@@ -6,15 +6,15 @@
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 
+#include <array>
 #include <atomic>
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <iostream>
 #include <new>
-#include <system_error>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -82,9 +82,10 @@ void restart_with_settings(char** argv) {
   if (!std::getenv("OMP_WAIT_POLICY")) set("GOMP_SPINCOUNT", "1000");
   set("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1");
   if (!is_new) return;
-  std::error_code error;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (!error) execv(program.c_str(), argv);  // returns if the system refuses; then all goes on as it is
+  std::array<char, 4096> program{};  // longer paths are not followed
+  const ssize_t length = readlink("/proc/self/exe", program.data(), program.size());
+  if (length <= 0 || static_cast<std::size_t>(length) == program.size()) return;
+  execv(program.data(), argv);  // returns if the system refuses; then all goes on as it is
 #endif
 }
 
