@@ -88,14 +88,18 @@ void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, 
       const auto rows = map_transposed.row_columns(j);
       const auto values = map_transposed.row_values(j);
       for (std::size_t a = 0; a < rows.size(); ++a) weight[rows[a]] = values[a];
+      // H is symmetric: the blocks of each row up to its diagonal, those before it twice, make half of D + D^T.
       double sum[9] = {};
       for (std::size_t a = 0; a < rows.size(); ++a)
         for (std::size_t k = hessian.offsets[rows[a]]; k < hessian.offsets[rows[a] + 1]; ++k) {
-          const double w = values[a] * weight[hessian.columns[k]];
+          const Index column = hessian.columns[k];
+          if (column > rows[a]) break;
+          const double w = values[a] * weight[column] * (column < rows[a] ? 1 : 0.5);
           if (w == 0) continue;
           for (int e = 0; e < 9; ++e) sum[e] += w * hessian.blocks[9 * k + e];
         }
-      for (int e = 0; e < 9; ++e) diagonal[j](e / 3, e % 3) += sum[e];
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) diagonal[j](r, c) += sum[3 * r + c] + sum[3 * c + r];
       for (Index i : rows) weight[i] = 0;
     }
   }

@@ -41,8 +41,8 @@ struct BlockSparse {
 /// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], all in [0, num_rows), else InputError.
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);
 
-/// Adds the 3x3 diagonal blocks of M^T H M: D_j += sum_ik M_ij H_ik M_kj. Runs in parallel; the result has the same
-/// bits for any number of threads.
+/// Adds the 3x3 diagonal blocks of M^T H M: D_j += sum_ik M_ij H_ik M_kj. H must be symmetric: H_ki = H_ik^T. Runs in
+/// parallel; the result has the same bits for any number of threads.
 void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
                          std::span<Mat3> diagonal);
 
