@@ -73,14 +73,18 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
 }
 
 Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const SurfaceDistanceOptions& options) {
-  constexpr double kLeastShare = 0.5;  // of the area that a sample stands for; smaller triangles have none of their own
+  // Of a surface with so many triangles per sample, those of less than this share of a sample's area count by their
+  // corners. Distances of a fitted surface are largest at its corners, so it must not be coarse where this is done.
+  constexpr std::size_t kDense = 4;
+  constexpr double kLeastShare = 0.125;
   Samples samples;
   std::vector<double> areas(order.size());
   for (std::size_t place = 0; place < order.size(); ++place) samples.area += areas[place] = area_of(mesh, order[place]);
+  const bool is_dense = order.size() > kDense * static_cast<std::size_t>(options.num_samples);
   std::vector<double> of_vertex(mesh.positions.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
     const double share = samples.area > 0 ? options.num_samples * (areas[place] / samples.area) : 0;
-    const bool is_small = order.size() > static_cast<std::size_t>(options.num_samples) && share < kLeastShare;
+    const bool is_small = is_dense && share < kLeastShare;
     samples.cuts.push_back(is_small ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(share)))));
     if (is_small)
       for (const Index v : mesh.triangles[order[place]]) of_vertex[v] += areas[place] / 3;
