@@ -44,7 +44,14 @@ std::vector<Mat3> BlockSparse::diagonal() const {
   return result;
 }
 
-void BlockSparse::set_zero() { std::fill(blocks.begin(), blocks.end(), 0.0f); }
+void BlockSparse::set_zero() {
+  if (blocks.size() != 9 * num_entries()) {
+    blocks.assign(9 * num_entries(), 0.0f);
+    return;
+  }
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = 0;
+}
 
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes) {
   for (Index node : nodes)
@@ -59,20 +66,29 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
   for (std::size_t e = 0; e < num_elements; ++e)
     for (std::size_t k = offsets[e]; k < offsets[e + 1]; ++k) elements[next[nodes[k]]++] = static_cast<Index>(e);
 
+  // Slices of rows run in parallel; then they are put together.
+  constexpr std::size_t kSlice = 1024;
+  std::vector<std::vector<Index>> slices((num_rows + kSlice - 1) / kSlice);
   BlockSparse result;
-  result.offsets.reserve(num_rows + 1);
-  std::vector<Index> row;
-  for (std::size_t i = 0; i < num_rows; ++i) {
-    row.assign(1, static_cast<Index>(i));
-    for (std::size_t k = first[i]; k < first[i + 1]; ++k)
-      row.insert(row.end(), nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k]]),
-                 nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k] + 1]));
-    std::sort(row.begin(), row.end());
-    row.erase(std::unique(row.begin(), row.end()), row.end());
-    result.columns.insert(result.columns.end(), row.begin(), row.end());
-    result.offsets.push_back(result.columns.size());
+  result.offsets.assign(num_rows + 1, 0);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t s = 0; s < slices.size(); ++s) {
+    std::vector<Index> row;
+    for (std::size_t i = s * kSlice; i < std::min(num_rows, (s + 1) * kSlice); ++i) {
+      row.assign(1, static_cast<Index>(i));
+      for (std::size_t k = first[i]; k < first[i + 1]; ++k)
+        row.insert(row.end(), nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k]]),
+                   nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k] + 1]));
+      std::sort(row.begin(), row.end());
+      row.erase(std::unique(row.begin(), row.end()), row.end());
+      slices[s].insert(slices[s].end(), row.begin(), row.end());
+      result.offsets[i + 1] = row.size();
+    }
   }
-  result.blocks.assign(9 * result.columns.size(), 0.0f);
+  for (std::size_t i = 0; i < num_rows; ++i) result.offsets[i + 1] += result.offsets[i];
+  result.columns.reserve(result.offsets.back());
+  for (const std::vector<Index>& slice : slices)
+    result.columns.insert(result.columns.end(), slice.begin(), slice.end());
   return result;
 }
 

@@ -17,7 +17,7 @@ namespace subvol::internal {
 struct BlockSparse {
   std::vector<std::size_t> offsets{0};  ///< num_rows() + 1 entries
   std::vector<Index> columns;
-  std::vector<float> blocks;  ///< 9 per entry, row-major
+  std::vector<float> blocks;  ///< 9 per entry, row-major; empty in a pattern
 
   std::size_t num_rows() const { return offsets.size() - 1; }
   std::size_t num_entries() const { return columns.size(); }
@@ -33,10 +33,12 @@ struct BlockSparse {
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const;
   /// Returns the diagonal blocks as 3x3 matrices; zero if the pattern has none.
   std::vector<Mat3> diagonal() const;
+  /// Sets all blocks to zero; those of a pattern are made.
   void set_zero();
 };
 
-/// Returns a zero matrix whose pattern couples the nodes of every element with one another, and every node with itself.
+/// Returns a pattern, a matrix without blocks, that couples the nodes of every element with one another, and every node
+/// with itself.
 ///
 /// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], all in [0, num_rows), else InputError.
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);

@@ -34,18 +34,21 @@ CellBlocks::CellBlocks(const VolumeMesh& mesh)
   if (pattern_.num_entries() > std::numeric_limits<Index>::max())
     throw InputError("a mesh of " + std::to_string(mesh.num_vertices()) +
                      " vertices has more pairs of them in cells than can be numbered");
-  pattern_.blocks = {};
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    offsets_.push_back(offsets_.back() + mesh.cell(c).size() * mesh.cell(c).size());
+  slots_.resize(offsets_.back());
+#pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto cell = mesh.cell(c);
+    std::size_t slot = offsets_[c];
     for (Index a : cell)
-      for (Index b : cell) slots_.push_back(static_cast<Index>(pattern_.find(a, b)));
-    offsets_.push_back(slots_.size());
+      for (Index b : cell) slots_[slot++] = static_cast<Index>(pattern_.find(a, b));
   }
 }
 
 BlockSparse CellBlocks::zero_matrix() const {
   BlockSparse result = pattern_;
-  result.blocks.assign(9 * result.columns.size(), 0.0f);
+  result.set_zero();
   return result;
 }
 

@@ -174,14 +174,16 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   target_offsets_.assign(triangles().size() + 1, 0);
   for (const auto& hit : target_hits_) ++target_offsets_[hit.triangle + 1];
   for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
-  std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1);
+  std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1), places;
+  for (const auto& hit : target_hits_) places.push_back(next[hit.triangle]++);
   target_links_.resize(points.size());
+#pragma omp parallel for schedule(static)
   for (std::size_t j = 0; j < points.size(); ++j) {
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
     const double distance = target_hits_[j].distance;
     const bool has_direction = straight && distance > kLeastOffset * target_->length();
-    target_links_[next[t]++] = {t,
+    target_links_[places[j]] = {t,
                                 barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
                                 points[j],
                                 has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)

@@ -24,6 +24,7 @@ SurfaceTerm::SurfaceTerm(std::vector<std::array<Index, 3>> sample_triangles, std
   if (num_samples == 0) throw InputError("SurfaceTerm: num_samples must be positive");
   const std::span<const Index> corners(triangles_.empty() ? nullptr : triangles_[0].data(), 3 * triangles_.size());
   hessian_ = clique_pattern(num_samples, clique_offsets(triangles_.size()), corners);
+  hessian_.set_zero();
   gradient_.resize(num_samples);
 
   incidence_offsets_.assign(num_samples + 1, 0);
