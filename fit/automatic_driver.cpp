@@ -74,12 +74,6 @@ void AutomaticDriver::note_end_in_template() {
   result_.report.explanation = "cancelled in the template";
 }
 
-void AutomaticDriver::take_in(VolumeMesh& mesh) {
-  target_.normalisation.take_in(mesh);
-  if (result_.report.stages.empty())
-    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
-}
-
 QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule schedule) {
   // As in the merit of a trial, poor cells cost more than a place that is slightly too far. With the weights of other
   // lifts, y-belt-idler kept a scaled Jacobian of 0.28 rather than a largest distance of 0.58 % for 0.52.
@@ -137,8 +131,10 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
   QualityStages stages(mesh_, lengths, cage_ ? cage_->level().nodes : identity_map(mesh_.num_vertices()), {}, boundary,
                        target_.surface, creases);
   if (prepare) prepare(stages);
+  if (!std::exchange(has_started_, true))
+    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)))));
   if (options_.keep_states) {
-    states_ = {{"start", unknowns()}};
+    if (!schedule.stages.empty()) states_ = {{"start", unknowns()}};  // else the mesh was fitted before
     stages.after_stage = [this](const std::string& name, const std::vector<Vec3>& x) { states_.push_back({name, x}); };
   }
   StageRecord record;

@@ -65,9 +65,6 @@ class AutomaticDriver {
   std::function<bool(double)> begin_template();
   /// Tells in the report that the fit ended in a template.
   void note_end_in_template();
-  /// Takes a template in the target's coordinates into the fit's, and reports its distance if it is the first one.
-  void take_in(VolumeMesh& mesh);
-
   /// Makes the present mesh the cage of the mesh that it is subdivided to, which is then the present one.
   virtual void begin_cage();
   /// Fits the present mesh at one level. what: is added to its name in the report.
@@ -97,8 +94,8 @@ class AutomaticDriver {
   /// Lifts the best trial beyond the quality aimed at, and judges the result as another trial, if it is the present
   /// mesh and good: by a step as long as the last one was reached, while its surface stays about where it is.
   bool polish();
-  /// Minimizes (`QualityStages`).  creases  may be empty.  prepare  is called with the stages before they run; may be
-  /// empty.
+  /// Minimizes (`QualityStages`). The report gets the distance of the first mesh, as it is before that.  creases  may
+  /// be empty.  prepare  is called with the stages before they run; may be empty.
   bool run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
                   const std::function<CreaseEnergy(double)>& creases, int level, const QualitySchedule& schedule,
                   const char* what, const std::function<void(QualityStages&)>& prepare = {});
@@ -130,6 +127,7 @@ class AutomaticDriver {
   std::vector<Index> hopeless_cells() const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 
+  bool has_started_ = false;        ///< a mesh has been fitted
   bool is_relaxing_ = false;        ///< `relax_hopeless_cells` precedes the stages
   std::optional<Vec3> relaxed_at_;  ///< its first place, in the target's coordinates
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept

@@ -156,10 +156,14 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   }
   if (made.templates.empty()) {
     if (!diagnosis_) diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
+    if (diagnosis_->is_cancelled) {
+      note_end_in_template();
+      return std::nullopt;
+    }
     no_template_ = "target: " + why_no_grid(*diagnosis_, options.cells, made.wanted) + "; give a --template";
     return std::nullopt;
   }
-  take_in(made.templates.front().mesh);
+  target_.normalisation.take_in(made.templates.front().mesh);
   return std::move(made.templates.front());
 }
 
@@ -467,7 +471,7 @@ bool AutomaticFit::run_graded() {
   std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
                                                     target_.normalisation.from_unit(std::move(places)), most, stop);
   if (!graded) return !stop.is_stopped();
-  take_in(graded->mesh);
+  target_.normalisation.take_in(graded->mesh);
   layout_.reset();
   cage_.reset();
   mesh_ = std::move(graded->mesh);

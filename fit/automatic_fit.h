@@ -72,7 +72,7 @@ struct AutomaticFitOptions {
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
   internal::StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
-  bool keep_states = false;  ///< fills AutomaticFitResult::states, but not if the target has several regions
+  bool keep_states = false;           ///< fills AutomaticFitResult::states
 };
 
 /// A sharp edge of the target that no edges of the mesh follow.
@@ -102,6 +102,7 @@ struct AutomaticFitTrial {
   /// A place at which the boundary met itself or cells were poor, and the mesh was relaxed, in the target's
   /// coordinates; empty: there was none.
   std::optional<Vec3> relaxed_at;
+  std::size_t wrong_sheets = 0;  ///< of a target with regions: those whose topology the template does not have
   bool is_polished = false;                       ///< it is the trial before, lifted beyond the quality aimed at
   double merit = 0;                               ///< 0: all aims are reached; lower is better
 };

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_groups.h"
 
+#include "subvol/base/error.h"
 #include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/target/carried_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 namespace subvol::internal {
@@ -93,12 +95,21 @@ AutomaticFitResult fit_for_groups(const TriangleMesh& target, const AutomaticFit
   left.keeps_groups = true;
   if (options.time_limit_seconds > 0)
     left.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - first.report.seconds.front().second);
-  AutomaticFitResult second = fit(true, left);
+  AutomaticFitResult second;
+  try {
+    second = fit(true, left);
+  } catch (const InputError& error) {  // no grid that follows the borders has the topology
+    first.report.warnings.push_back(std::string("borders between groups are not followed: ") + error.what());
+    return first;
+  }
   if (is_preferred(target, second, first, missed)) {
     add(second, first, true);
     return second;
   }
-  if (second.report.stop_reason == StopReason::cancelled) first.report.stop_reason = StopReason::cancelled;
+  if (second.report.stop_reason == StopReason::cancelled) {
+    first.report.stop_reason = StopReason::cancelled;
+    first.report.explanation = second.report.explanation;
+  }
   add(first, second, false);
   return first;
 }

@@ -147,7 +147,7 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   }
   VolumeMesh mesh = std::move(made.made->mesh);
   template_ = std::move(*made.made);
-  take_in(mesh);
+  target_.normalisation.take_in(mesh);
   least_edge_ =
       least_edge_share(mesh, wanted_lengths(MeshTopology(mesh), {}, mesh.num_cells(), target_.surface.area()));
   return mesh;
@@ -252,6 +252,7 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   const SurfaceDistance outer = target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
   const SurfaceDistance inner = target_.interface_distance(mesh_);
   trial.through_planes = template_.through_planes;
+  trial.wrong_sheets = template_.wrong_sheets;
   trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
   trial.max_percent = 100 * std::max(outer.max(), inner.max());
   trial.volume_percent = volume_percent();
@@ -346,11 +347,11 @@ void RegionFit::conclude() {
                                         options_.quality, options_.mean_tolerance_percent,
                                         options_.max_tolerance_percent, kAutomaticVolumePercent) +
                               report.explanation);
-  if (template_.wrong_sheets > 0)
+  if (chosen.wrong_sheets > 0)
     report.warnings.push_back(
         formatted("%zu interfaces or parts of the boundary have another topology than in the "
                   "target; more --cells may mend that",
-                  template_.wrong_sheets));
+                  chosen.wrong_sheets));
   warn_of_missed_edges(result_.missed_edges, chosen.curves, "curves", report);
   mark_if_far_off(result_, options_, "curves");
 }

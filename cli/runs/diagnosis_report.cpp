@@ -244,6 +244,9 @@ std::string to_text(const FillingForecast& forecast) {
   if (!forecast.refusal.empty()) return "a fit refuses it:   " + without_subject(forecast.refusal) + '\n';
   std::string text;
   for (const std::string& done : forecast.repair.done) text += "a fit repairs it:   " + without_subject(done) + '\n';
+  for (const std::string& note : forecast.repair.notes) text += "a fit notes:        " + without_subject(note) + '\n';
+  if (forecast.repair.regions)
+    text += formatted("a fit fills it:     as %zu regions\n", forecast.repair.regions->regions.size());
   if (!forecast.repair.is_fillable)
     text += "a fit goes on with what is left, and may be far off or meet itself there\n";
   return text;
@@ -251,7 +254,11 @@ std::string to_text(const FillingForecast& forecast) {
 
 Json filling_json(const FillingForecast& forecast) {
   if (!forecast.refusal.empty()) return {{"refused", as_utf8(forecast.refusal)}};
-  return {{"repairs", forecast.repair.done}, {"complete", forecast.repair.is_fillable}};
+  Json json{{"repairs", forecast.repair.done},
+            {"notes", forecast.repair.notes},
+            {"complete", forecast.repair.is_fillable}};
+  if (forecast.repair.regions) json["regions"] = forecast.repair.regions->regions.size();
+  return json;
 }
 
 void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& warnings) {

@@ -334,8 +334,8 @@ void refuse_automatic_options(const CLI::App& verb) {
   for (const std::string option : {"--max-tolerance", "--size", "--regions", "--wrap"})
     if (verb.count(option) > 0)
       throw UsageError(option +
-                       ": only fits without a template, --order and options of the method aim at it, and none "
-                       "that makes a cage with several regions");
+                       ": only an automatic fit takes this option: leave out --template, --order and options of the "
+                       "method (such as --cage-only), and make no cage of several regions");
 }
 
 AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const CLI::App& verb) {

@@ -19,6 +19,9 @@
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+#ifdef __linux__
+#include <sys/auxv.h>
+#endif
 #include <unistd.h>
 
 namespace subvol::cli {
@@ -81,7 +84,8 @@ void restart_with_settings(char** argv) {
   };
   if (!std::getenv("OMP_WAIT_POLICY")) set("GOMP_SPINCOUNT", "1000");
   set("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1");
-  if (!is_new) return;
+  // Without an interpreter, the program was started as an argument of the loader, which /proc/self/exe names then.
+  if (!is_new || getauxval(AT_BASE) == 0) return;
   std::array<char, 4096> program{};  // longer paths are not followed
   const ssize_t length = readlink("/proc/self/exe", program.data(), program.size());
   if (length <= 0 || static_cast<std::size_t>(length) == program.size()) return;

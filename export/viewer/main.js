@@ -192,6 +192,7 @@ async function start(root) {
 
   const keys = {
     e: () => viewer.set({ edges: !viewer.state.edges }),
+    w: () => viewer.set({ faces: !viewer.state.faces }),
     c: () => buttons.cut.click(),
     m: measure,
     s: save,

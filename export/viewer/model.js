@@ -172,15 +172,15 @@ export class Model {
   }
 
   /// Which of its objects are seen.
-  reveal({ limit, edges, ghost, marks }) {
+  reveal({ limit, edges, faces, ghost, marks }) {
     const seen = {
-      cells: !limit,
+      cells: !limit && faces,
       lines: !limit && edges,
-      section: !limit,
+      section: !limit && faces,
       section_lines: !limit && edges,
       ghost: ghost && !limit,
       marks: marks && !limit,
-      limit,
+      limit: limit && faces,
       limit_lines: limit && edges,
       cage: limit,
       chosen: !limit,

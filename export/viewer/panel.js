@@ -14,6 +14,7 @@ const KEYS = [
   ["0", "the whole mesh"],
   ["x, y, z", "look along an axis, again: from the other side"],
   ["e", "edges on or off"],
+  ["w", "wireframe on or off"],
   ["c", "cut on or off"],
   ["[ and ]", "move the cut"],
   ["p, Shift + p", "peel a layer, put it back"],
@@ -78,6 +79,7 @@ export class Panel {
       peel: slider("Peel layers", { min: 0, max: 1, step: 1 }, (peel) => set({ peel })),
       ghost: check("Ghost of what is hidden", (ghost) => set({ ghost })),
       edges: check("Edges of the cells", (edges) => set({ edges })),
+      wireframe: check("Wireframe: edges alone", (wireframe) => set({ faces: !wireframe })),
       shrink: slider(
         "Size of cells",
         { min: 0.3, max: 1, step: 0.01 },
@@ -145,6 +147,7 @@ export class Panel {
         true,
         parts.limit,
         parts.edges,
+        parts.wireframe,
         parts.shrink,
         parts.marks,
         parts.target,
@@ -201,6 +204,7 @@ export class Panel {
     parts.peel.show(state.peel);
     parts.ghost.show(state.ghost);
     parts.edges.show(state.edges);
+    parts.wireframe.show(!state.faces);
     parts.shrink.show(state.shrink);
     parts.limit.show(state.limit);
     parts.limit.hidden = !("limit" in model.parts);

@@ -34,6 +34,7 @@ function first_state() {
     low: 0,
     high: 1,
     edges: true,
+    faces: true, // false: a wireframe
     shrink: 1,
     peel: 0,
     cut: { on: false, axis: "x", normal: [1, 0, 0], position: 0.5, flipped: false, flat: true },
@@ -356,7 +357,8 @@ export class Viewer {
       for (const other of this.models) other.group.visible = other === model;
       model.reveal({
         limit: state.limit && "limit" in model.parts,
-        edges: state.edges && !this.is_moving,
+        edges: !state.faces || (state.edges && !this.is_moving),
+        faces: state.faces,
         ghost: this.wants_ghost && !this.is_moving,
         marks: state.marks,
       });

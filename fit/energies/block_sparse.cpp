@@ -2,6 +2,7 @@
 #include "subvol/fit/energies/block_sparse.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
 
 #include <omp.h>
 
@@ -33,17 +34,6 @@ void BlockSparse::multiply(std::span<const Vec3> in, std::span<Vec3> out) const 
   }
 }
 
-std::vector<Mat3> BlockSparse::diagonal() const {
-  std::vector<Mat3> result(num_rows(), Mat3::Zero());
-  for (std::size_t i = 0; i < num_rows(); ++i) {
-    const std::size_t k = find(static_cast<Index>(i), static_cast<Index>(i));
-    if (k == num_entries()) continue;
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) result[i](r, c) = block(k)[3 * r + c];
-  }
-  return result;
-}
-
 void BlockSparse::set_zero() {
   if (blocks.size() != 9 * num_entries()) {
     blocks.assign(9 * num_entries(), 0.0f);
@@ -71,8 +61,7 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
   std::vector<std::vector<Index>> slices((num_rows + kSlice - 1) / kSlice);
   BlockSparse result;
   result.offsets.assign(num_rows + 1, 0);
-#pragma omp parallel for schedule(dynamic)
-  for (std::size_t s = 0; s < slices.size(); ++s) {
+  const auto fill = [&](std::size_t s) {
     std::vector<Index> row;
     for (std::size_t i = s * kSlice; i < std::min(num_rows, (s + 1) * kSlice); ++i) {
       row.assign(1, static_cast<Index>(i));
@@ -84,7 +73,11 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
       slices[s].insert(slices[s].end(), row.begin(), row.end());
       result.offsets[i + 1] = row.size();
     }
-  }
+  };
+  ParallelErrors errors;
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t s = 0; s < slices.size(); ++s) errors.guard([&] { fill(s); });
+  errors.rethrow();
   for (std::size_t i = 0; i < num_rows; ++i) result.offsets[i + 1] += result.offsets[i];
   result.columns.reserve(result.offsets.back());
   for (const std::vector<Index>& slice : slices)

@@ -31,8 +31,6 @@ struct BlockSparse {
   /// out = B in. Both have num_rows() entries and must not overlap. Rows run in parallel; the result has the same bits
   /// for any number of threads.
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const;
-  /// Returns the diagonal blocks as 3x3 matrices; zero if the pattern has none.
-  std::vector<Mat3> diagonal() const;
   /// Sets all blocks to zero; those of a pattern are made.
   void set_zero();
 };

@@ -328,7 +328,7 @@ std::vector<double> ClosestPointEnergy::triangle_distances_with_corners() const 
   std::vector<double> of_sample(num_samples());
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < of_sample.size(); ++i) {
-    const ClosestPoint::Hit hit = target_tree_->closest(assigned()[i], groups_.empty() ? 0 : kNoIndex);
+    const ClosestPoint::Hit hit = target_tree_->closest(assigned()[i], kNoIndex);
     of_sample[i] = over_rim(hit) ? 0 : hit.distance;
   }
   for (std::size_t t = 0; t < result.size(); ++t)

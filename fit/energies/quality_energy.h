@@ -95,7 +95,7 @@ class QualityEnergy final : public VolumeTerm {
   void least_scaled_jacobians(std::span<const Vec3> nodes, std::span<double> least) const;
 
   /// Returns the cells, ascending, that are below the goal at the five points in each direction at which checks sample,
-  /// though not at their own; without cells that have caps.
+  /// though not at their own. Cells with caps are left out.
   std::vector<Index> poor_between_points(std::span<const Vec3> nodes, double goal) const;
 
   double value(std::span<const Vec3> nodes) const override;

@@ -9,9 +9,11 @@
 
 namespace subvol::internal {
 
-/// The distortion E_W of the cells of a finite element mesh, as a function of its nodes y. Paper: Eqs. 2, 3, 7.
+/// An energy of the shapes of the cells of a finite element mesh, as a function of its nodes y: their distortion E_W
+/// (paper: Eqs. 2, 3, 7), or what raises their scaled Jacobians (`QualityEnergy`).
 ///
-/// Dimensionless, >= 0; +infinity if a determinant is not positive at a quadrature point; never NaN for finite nodes.
+/// Dimensionless, >= 0; never NaN for finite nodes. Nodes at which it is +infinity are infeasible: for distortions,
+/// those at which a determinant is not positive at a quadrature point.
 class VolumeTerm {
  public:
   virtual ~VolumeTerm() = default;
@@ -31,8 +33,9 @@ class VolumeTerm {
   virtual void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                                    std::span<Mat3> diagonal) const = 0;
 
-  /// Returns the largest t in (0, limit] of a geometric sequence such that every determinant at the quadrature points
-  /// keeps at least a tenth of its value on the way from y to y + t d. The nodes must be feasible.
+  /// Returns the largest t in (0, limit] of a geometric sequence such that the nodes stay feasible on the way from y to
+  /// y + t d, from feasible ones: of distortions, every determinant at the quadrature points keeps at least a tenth of
+  /// its value. Terms that are finite everywhere return the limit.
   virtual double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const = 0;
 
   /// Makes H stiffer at the points that do not admit the step from y to y + t d (see `max_step`), so that the next

@@ -16,7 +16,7 @@ namespace subvol::internal {
 class GroupedClosestPoint {
  public:
   /// groups  group of each triangle, from 0 on; empty: all in group 0. InputError: another number of groups than of
-  ///         triangles, and as `ClosestPoint`. Cost: that of `ClosestPoint`, plus a copy of the positions per group.
+  ///         triangles, and as `ClosestPoint`. Cost: twice that of `ClosestPoint`.
   explicit GroupedClosestPoint(const TriangleMesh& mesh, std::span<const Index> groups = {});
 
   /// As `ClosestPoint::order`.

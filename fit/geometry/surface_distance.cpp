@@ -73,8 +73,8 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
 }
 
 Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const SurfaceDistanceOptions& options) {
-  // Of a surface with so many triangles per sample, those of less than this share of a sample's area count by their
-  // corners. Distances of a fitted surface are largest at its corners, so it must not be coarse where this is done.
+  // If there are more than kDense triangles per sample, a triangle of less than kLeastShare of a sample's area is
+  // sampled at its corners only. A fitted surface is farthest at its corners, so a coarse one must not be sampled so.
   constexpr std::size_t kDense = 4;
   constexpr double kLeastShare = 0.125;
   Samples samples;

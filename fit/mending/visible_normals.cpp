@@ -2,6 +2,7 @@
 #include "subvol/fit/mending/visible_normals.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
 
 #include <Eigen/Geometry>
 
@@ -95,26 +96,25 @@ VisibleNormals visible_normals(const PolygonMesh& surface) {
     }
   VisibleNormals result;
   result.directions.assign(num_vertices, Vec3::Zero());
-#pragma omp parallel
-  {
+  const auto look_at = [&](std::size_t v) {
     std::vector<Vec3> own, all;
-#pragma omp for schedule(static)
-    for (std::size_t v = 0; v < num_vertices; ++v) {
-      own.clear(), all.clear();
-      for (const std::size_t h : corners[v]) {
-        const std::size_t f = face_of_corner[h], begin = surface.face_offsets[f], end = surface.face_offsets[f + 1];
-        own.push_back(normals[h]);
-        if (end - begin == 3)
-          all.push_back(normals[h]);
-        else
-          all.insert(all.end(), normals.begin() + begin, normals.begin() + end);
-      }
-      if (std::any_of(own.begin(), own.end(), [](const Vec3& n) { return !(n.squaredNorm() > 0.5); })) continue;
-      std::optional<Vec3> direction = most_visible_direction(all);
-      if (!direction) direction = most_visible_direction(own);
-      if (direction) result.directions[v] = *direction;
+    for (const std::size_t h : corners[v]) {
+      const std::size_t f = face_of_corner[h], begin = surface.face_offsets[f], end = surface.face_offsets[f + 1];
+      own.push_back(normals[h]);
+      if (end - begin == 3)
+        all.push_back(normals[h]);
+      else
+        all.insert(all.end(), normals.begin() + begin, normals.begin() + end);
     }
-  }
+    if (std::any_of(own.begin(), own.end(), [](const Vec3& n) { return !(n.squaredNorm() > 0.5); })) return;
+    std::optional<Vec3> direction = most_visible_direction(all);
+    if (!direction) direction = most_visible_direction(own);
+    if (direction) result.directions[v] = *direction;
+  };
+  ParallelErrors errors;
+#pragma omp parallel for schedule(static)
+  for (std::size_t v = 0; v < num_vertices; ++v) errors.guard([&] { look_at(v); });
+  errors.rethrow();
   for (std::size_t v = 0; v < num_vertices; ++v)
     if (result.directions[v].isZero(0)) result.hidden.push_back(static_cast<Index>(v));
   return result;

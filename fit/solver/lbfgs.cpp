@@ -3,6 +3,7 @@
 
 #include "subvol/fit/solver/vector_math.h"
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <limits>

@@ -83,7 +83,7 @@ class LevenbergMarquardtRun {
   AndersonMemory memory_;
   std::vector<Vec3> step_;
   bool is_assigned_ = false;  // true if the surface term's correspondences are those of z_
-  std::vector<Index> uncertified_;
+  std::vector<Index> uncertified_, trial_uncertified_;  // at y_ and at y_trial_
   std::vector<double> trial_cells_;  // energy of each cell at y_trial_
   double energy_ = 0, trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
 };
@@ -148,12 +148,14 @@ bool LevenbergMarquardtRun::shorten_where_harmful() {
     try_nodes();
   }
   for (int pass = 0; pass < kStops; ++pass) {
-    const std::vector<Index> failed = newly_failed(uncertified_, problem_.volume->uncertified(y_trial_));
+    trial_uncertified_ = problem_.volume->uncertified(y_trial_);
+    const std::vector<Index> failed = newly_failed(uncertified_, trial_uncertified_);
     if (failed.empty()) return true;
     shorten_at(failed, 0);
     try_nodes();
   }
-  return newly_failed(uncertified_, problem_.volume->uncertified(y_trial_)).empty();
+  trial_uncertified_ = problem_.volume->uncertified(y_trial_);
+  return newly_failed(uncertified_, trial_uncertified_).empty();
 }
 
 void LevenbergMarquardtRun::evaluate_trial() {
@@ -206,6 +208,7 @@ void LevenbergMarquardtRun::take_step(IterationRecord& record) {
   add_scaled(1, d_, x_);
   problem_.apply_nodes(x_, y_);
   problem_.apply_samples(x_, z_);
+  uncertified_ = std::move(trial_uncertified_);
   record.surface_energy = trial_surface_;
   record.volume_energy = trial_volume_;
 }
@@ -224,7 +227,8 @@ bool LevenbergMarquardtRun::take_accelerated_step(IterationRecord& record) {
     const double volume = problem_.volume->value(y_trial_);
     if (!(problem_.lambda * volume <= trial_)) return false;
     if (!problem_.volume->ruined(y_, y_trial_).empty()) return false;
-    if (!newly_failed(uncertified_, problem_.volume->uncertified(y_trial_)).empty()) return false;
+    std::vector<Index> uncertified = problem_.volume->uncertified(y_trial_);
+    if (!newly_failed(uncertified_, uncertified).empty()) return false;
     problem_.apply_samples(step_, z_trial_);
     problem_.surface->assign(z_trial_);
     const double surface = problem_.surface->value(z_trial_), energy = surface + problem_.lambda * volume;
@@ -232,6 +236,7 @@ bool LevenbergMarquardtRun::take_accelerated_step(IterationRecord& record) {
     trial_ = energy;
     record.surface_energy = surface;
     record.volume_energy = volume;
+    uncertified_ = std::move(uncertified);
     return true;
   };
   if (!accept()) {

@@ -17,12 +17,13 @@ struct FitProblem;
 /// Why a minimization ended; infeasible_start: at once, because E is infinite at the start.
 enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
 
-/// One Newton (or L-BFGS) step.
+/// One step of a minimizer.
 struct IterationRecord {
   double surface_energy = 0, volume_energy = 0;  ///< E_S and E_W (dimensionless), E = E_S + lambda E_W   Paper: Eq. 1
-  double step_length = 0;                        ///< accepted fraction of the search direction
-  int linear_iterations = 0;                     ///< CG iterations of this step
-  int evaluations = 0;                           ///< energy evaluations of its line search
+  /// Accepted fraction of the search direction; 1 for Levenberg-Marquardt steps, which are shortened locally.
+  double step_length = 0;
+  int linear_iterations = 0;  ///< CG iterations of this step
+  int evaluations = 0;  ///< energies of its line search; Levenberg-Marquardt: values of the damping that were tried
 };
 
 struct MinimizerResult {
@@ -54,9 +55,9 @@ struct MinimizerOptions {
   bool accelerates = false;
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;
-  double first_damping = kFirstDamping;  ///< the same: mu of the first step, > 0
-  /// The same: if E rises, the step is first shortened at the cells whose energy rises most, and damped only then. Not
-  /// where these are the cells that have to move.
+  double first_damping = kFirstDamping;  ///< Levenberg-Marquardt only: mu of the first step, > 0
+  /// Levenberg-Marquardt only: if E rises, the step is first shortened at the cells whose energy rises most, and damped
+  /// only then. Not where these are the cells that have to move.
   bool spares_most = true;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;

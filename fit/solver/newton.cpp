@@ -230,13 +230,14 @@ MinimizerResult NewtonRun::run() {
     if (found == Search::level) return end(MinimizerStop::converged, "the gradient vanishes");
     if (!blocking_.empty()) {
       is_refined = true;
+      memory_.clear();  // the steps before lowered another E
       problem_.volume->densify(blocking_, y_);
       result_.densified.push_back(std::move(blocking_));
       result_.densified_at = x_;
     }
     if (found == Search::no_step)
       return end(MinimizerStop::no_step, "no step along the search direction decreases the energy");
-    if (!take_accelerated_step(record)) take_step(record);
+    if (is_refined || !take_accelerated_step(record)) take_step(record);
     if (is_done(record)) return std::move(result_);
   }
   return end(MinimizerStop::iteration_limit, "iteration limit");

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/stages/quality_patches.h"
+
 #include "subvol/base/disjoint_sets.h"
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <utility>
 
 namespace subvol::internal {

@@ -306,7 +306,7 @@ bool QualityStages::run_patches(const QualitySchedule& of_patch, std::span<const
   }
   StageRecord record = record_;
   record.name = formatted("%s, %s of %zu patches", record_.name.c_str(), name.c_str(), patches.size());
-  record.lambda = problem_->lambda;
+  record.lambda = lambda_one_ / of_patch.lift.surface;
   record.tangential_weight = kQualityTangentialWeight;
   record.unknowns = unknowns;
   record.raises_quality = true;

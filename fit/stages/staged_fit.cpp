@@ -14,6 +14,8 @@ void StagedFit::go_back(FitSnapshot snapshot) {
   mean_ = snapshot.mean_percent;
   states_.resize(snapshot.num_states);
   report().undo_stages(snapshot.num_stages, report().stages.size());
+  StageRecord* last = report().last_kept_stage();
+  if (last && mean_) last->mean_distance_percent = *mean_;  // that of a state after it may have been noted there
 }
 
 void StagedFit::keep_state() {

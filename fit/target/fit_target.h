@@ -75,7 +75,7 @@ struct FitTarget {
               std::size_t most = std::numeric_limits<std::size_t>::max());
 
   /// Returns the symmetric distances to another surface; for a cloud, those of its points to the surface.
-  /// extremes  false: the largest distances are not looked for at corners and edges, which takes a third of the time.
+  /// extremes  as in `SurfaceDistanceOptions`.
   SurfaceDistance distance(const TriangleMesh& fitted, bool extremes = true) const;
   double mean_distance(const TriangleMesh& fitted) const { return distance(fitted, false).mean(); }
 

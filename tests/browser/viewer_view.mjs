@@ -51,8 +51,8 @@ async function visit(width) {
   answer.first = look(viewer);
   answer.picture = viewer.picture().toDataURL("image/png");
   const { shown } = viewer.viewer.data;
-  const begin = () => viewer.set({ shown, cut: { on: false }, peel: 0, shrink: 1, edges: true, filter: { on: false },
-    limit: false, target: false });
+  const begin = () => viewer.set({ shown, cut: { on: false }, peel: 0, shrink: 1, edges: true, faces: true,
+    filter: { on: false }, limit: false, target: false });
   const key = (name, options = {}) => inside.document.querySelector("canvas").dispatchEvent(
     new inside.KeyboardEvent("keydown", { key: name, bubbles: true, cancelable: true, ...options }));
   const tries = {
@@ -60,6 +60,7 @@ async function visit(width) {
     "a cut of whole cells": async () => viewer.set({ cut: { on: true, axis: "x", flat: false } }),
     "no edges": async () => viewer.set({ edges: false }),
     "the key of the edges": async () => key("e"),
+    "a wireframe": async () => viewer.set({ faces: false }),
     "the arrow key": async () => key("ArrowLeft"),
     "another field": async () => viewer.set({ field: "edge_length" }),
   };

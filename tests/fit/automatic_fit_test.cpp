@@ -56,7 +56,7 @@ TEST_CASE("Both edges of a chamfer narrower than a cell are followed", "[slow]")
 TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
   const AutomaticFitResult result =
-      fit_automatically(ball, {.cells = 3000, .quality = 0.6, .mean_tolerance_percent = 0.1});
+      fit_automatically(ball, {.cells = 3000, .quality = 0.6, .mean_tolerance_percent = 0.1, .keep_states = true});
   REQUIRE(result.trials.size() >= 2);
   const AutomaticFitTrial &polished = result.trials.back(), &before = result.trials[result.trials.size() - 2];
   REQUIRE(polished.is_polished);
@@ -66,6 +66,10 @@ TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow
   CHECK(polished.least_scaled_jacobian > 0.7);
   CHECK(polished.max_percent <= kAutomaticMaxPercent);
   CHECK(check_mesh(result.mesh, &ball, {}).valid());
+  REQUIRE(result.states.size() > 3);  // those of the trial before belong to the same mesh
+  CHECK(result.states.front().name == "start");
+  CHECK(result.states[1].name.find("polished") == std::string::npos);
+  CHECK(result.states.back().name.find("polished") != std::string::npos);
 }
 
 TEST_CASE("A gap narrower than the mesh's distance stays open, and the relaxed trial is judged like any other",

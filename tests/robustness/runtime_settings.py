@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The program runs with OpenMP threads that spin for a short time and with huge pages, unless the user has set these.
+It also runs if the loader is asked to start it.
 
     runtime_settings.py PROGRAM SAMPLES
 """
@@ -56,6 +57,13 @@ def main():
             if found != (own, expected):
                 print(f"with {settings}: expected {own} with {expected}, found {found}")
                 return 1
+    loader = next(pathlib.Path("/lib64").glob("ld-linux-*.so.*"), None)
+    if loader:
+        words = [loader, program, "--version"]
+        through_loader = subprocess.run(words, capture_output=True, text=True, check=False).stdout
+        if not through_loader.startswith("subvol "):
+            print(f"through the loader, --version printed: {through_loader}")
+            return 1
     return 0
 
 
