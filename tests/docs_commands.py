@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs_commands.py PROGRAM SAMPLES SOURCE [PAGE ...]: runs every command of README.md and docs, as it stands there.
 
-Each page has a folder of its own, with what SAMPLES writes, STAND_INS for models of the reader's, `subvol` on the PATH
-and both programs under build/release. Commands are the lines of indented
-or ```sh blocks that begin with one of PROGRAMS; a backslash joins lines. Remarks before a block say what is special:
+Each page has a folder of its own, with what SAMPLES writes, `subvol` on the PATH and both programs under build/release.
+Commands are the lines of indented or ```sh blocks that begin with one of PROGRAMS; a backslash joins lines. Remarks
+before a block say what is special:
 
     <!-- not run: WHY -->   the block is for reading
     <!-- exits 3 -->        each command of the block ends with this status, and not with 0
@@ -15,7 +15,6 @@ Exit status 0 where all commands end as they should, 1 with the page, line and w
 import os
 import re
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -25,7 +24,6 @@ from pathlib import Path
 PROGRAMS = ("subvol", "build/release/subvol", "build/release/subvol_samples", "cmake", "cmake/install_packages", "npm",
             "python3", "venv/bin/python", "./quickstart", "./runtests", "tests/fuzz/run.py", "tests/robustness/",
             "node", "apt-get", "blender", "cd", "echo", "source", "ctest", "ninja", "git", "SUBVOL_FUZZ_SECONDS")
-STAND_INS = {"bone.off": "ball_target.off", "bone.mesh": "ball_template.mesh", "torus.off": "torus_target.off"}
 REMARK = re.compile(r"^<!-- (not run: .+|exits \d+|says) -->$")
 
 
@@ -111,8 +109,6 @@ def main():
             (build / "subvol").symlink_to(program)
             (build / "subvol_samples").symlink_to(samples)
             subprocess.run([samples, folder], check=True)
-            for name, sample in STAND_INS.items():
-                shutil.copy(Path(folder, sample), Path(folder, name))
             environment = {**os.environ, "PATH": f"{build}:{os.environ['PATH']}"}
             text = (source / page).read_text()
             page_wrong, page_ran = run_page(page, text, environment, folder)
