@@ -15,11 +15,7 @@ export function build_section(mesh, shown, { normal, offset }, field) {
     height = (p) => nx * points[3 * p] + ny * points[3 * p + 1] + nz * points[3 * p + 2] - offset;
   const drop = [nx, ny, nz].map(Math.abs).reduce((best, x, k, all) => (x > all[best] ? k : best), 0);
   const [u, v] = [0, 1, 2].filter((k) => k !== drop); // coordinates that tell points of the plane apart
-  const triangles = [3, 4].reduce((result, size) => {
-    result[size] = [];
-    for_each_triangle(size, n, (...three) => result[size].push(three));
-    return result;
-  }, []);
+  const pieces = [3, 4].reduce((result, size) => ({ ...result, [size]: pieces_of(size, n) }), {});
   const grid = new Uint32Array(face_points(4, n)),
     positions = [],
     values = [],
@@ -52,11 +48,11 @@ export function build_section(mesh, shown, { normal, offset }, field) {
     for (let f = 0; f < KINDS[kinds[c]].faces.length; ++f) {
       const size = KINDS[kinds[c]].faces[f].length;
       side_points(mesh, c, f, grid);
-      for (const three of triangles[size]) {
+      for (const three of pieces[size].flatMap((piece) => triangles_of(piece, grid))) {
         const ends = [];
         for (let k = 0; k < 3; ++k) {
-          const a = grid[three[k]],
-            b = grid[three[(k + 1) % 3]],
+          const a = three[k],
+            b = three[(k + 1) % 3],
             p = Math.min(a, b),
             q = Math.max(a, b);
           if (height(p) > 0 === height(q) > 0) continue;
@@ -94,6 +90,30 @@ export function build_section(mesh, shown, { normal, offset }, field) {
     triangle_cells: Uint32Array.from(triangle_cells),
     lines: Float32Array.from(lines),
   };
+}
+
+/// The triangles and quads of a face's grid, by place in the grid.
+function pieces_of(size, n) {
+  const triangles = [];
+  for_each_triangle(size, n, (...three) => triangles.push(three));
+  if (size === 3) return triangles;
+  return triangles.flatMap(([a, b, c], k) => (k % 2 === 0 ? [[a, b, c, triangles[k + 1][2]]] : []));
+}
+
+/// Triangles of a piece, as points. A quad is cut at its point of the lowest number: the cells on both sides of a
+/// warped face must cut it in the same way, because there would be holes between their sections otherwise.
+function triangles_of(piece, grid) {
+  const [a, b, c, d] = piece.map((place) => grid[place]);
+  if (piece.length === 3) return [[a, b, c]];
+  return Math.min(a, c) < Math.min(b, d)
+    ? [
+        [a, b, c],
+        [a, c, d],
+      ]
+    : [
+        [b, c, d],
+        [b, d, a],
+      ];
 }
 
 /// The loops of points with two neighbors each.
