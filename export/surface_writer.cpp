@@ -15,6 +15,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 namespace subvol {
 
@@ -56,6 +57,20 @@ std::string binary_stl(const TriangleMesh& mesh) {
   return bytes;
 }
 
+/// Returns true if a surface is so far from the origin that single precision would move its vertices by more than a
+/// millionth of its extent.
+bool needs_double_precision(const TriangleMesh& mesh) {
+  constexpr double kMostTimes = 16;  // single precision has 24 bits: 2^-24 * 16 is about 1e-6
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const auto& t : mesh.triangles)
+    for (const Index v : t) {
+      low = low.cwiseMin(mesh.positions[static_cast<std::size_t>(v)]);
+      high = high.cwiseMax(mesh.positions[static_cast<std::size_t>(v)]);
+    }
+  return !mesh.triangles.empty() &&
+         low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff() > kMostTimes * (high - low).maxCoeff();
+}
+
 /// A name on one line.
 std::string one_line(std::string name) {
   std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, ' ');
@@ -65,12 +80,17 @@ std::string one_line(std::string name) {
 std::string text_stl(const TriangleMesh& mesh) {
   std::string text;
   const std::size_t num_groups = mesh.face_groups.groups.size();
+  const auto group_of = [&](std::size_t t) {
+    return mesh.face_groups.empty() ? kNoIndex : mesh.face_groups.of_face[t];
+  };
   for (std::size_t g = 0; g <= num_groups; ++g) {
     const Index wanted = g < num_groups ? static_cast<Index>(g) : kNoIndex;
-    const std::string name = g < num_groups ? one_line(label_of(mesh.face_groups.groups[g])) : "none";
+    const std::string name = g < num_groups   ? one_line(label_of(mesh.face_groups.groups[g]))
+                             : num_groups > 0 ? "none"
+                                              : "subvol";
     std::string facets;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      if (mesh.face_groups.of_face[t] != wanted) continue;
+      if (group_of(t) != wanted) continue;
       facets += "facet normal ";
       append_vector(facets, normal_of(mesh, mesh.triangles[t]), " ");
       facets += "\nouter loop\n";
@@ -205,7 +225,9 @@ std::string surface_bytes(const std::string& extension, const PolygonMesh& surfa
   if (extension == ".vtp") return vtp_text(surface);
   const TriangleMesh triangles = triangulate(surface);
   if (extension == ".3mf") return threemf_bytes(triangles);
-  if (extension == ".stl") return triangles.face_groups.empty() ? binary_stl(triangles) : text_stl(triangles);
+  if (extension == ".stl")
+    return triangles.face_groups.empty() && !needs_double_precision(triangles) ? binary_stl(triangles)
+                                                                               : text_stl(triangles);
   throw InputError("surface_bytes: expected the extension .stl, .ply, .vtp or .3mf, found " + extension);
 }
 

@@ -24,9 +24,11 @@
 #include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/auto_template.h"
 
 #include <algorithm>
@@ -204,7 +206,8 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   begin_part(portion, schedule.expected_steps());
   const MeshTopology topology(mesh_);
   const std::vector<double> sizes = cage_ ? cage_->of_children(sizes_) : sizes_;
-  const std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
+  std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
+  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid.mesh, mesh_, lengths);
   const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of(mesh_);
   sample_target(topology.boundary_faces().size());
   QualityBoundary boundary{
@@ -292,6 +295,10 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   measure(surface);
   if (cage_) measure(cage_->limit_surface());
   trial.feature_miss = feature_miss(surface);
+  if (target_.surface.volume_source() == VolumeSource::signed_sum) {
+    const double volume = signed_volume(surface.positions, surface.triangles);
+    trial.solid_volume_percent = 100 * std::abs(volume / target_.surface.volume() - 1);
+  }
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
@@ -575,7 +582,8 @@ AutomaticFitResult AutomaticFit::run() {
 
 }  // namespace
 
-AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options) {
+AutomaticFitResult fit_automatically(const TriangleMesh& given, const AutomaticFitOptions& options) {
+  const TriangleMesh target = joined_at_open_edges(given);
   if (const std::optional<RegionSurface> regions = find_regions(target, options.regions)) {
     if (options.makes_cage)
       throw InputError(

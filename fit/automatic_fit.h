@@ -37,7 +37,8 @@ inline constexpr double kFarOffFactor = 2;
 /// more than its radius, if the radius is at least this, in percent of the diagonal: noise of a triangulation looks
 /// like smaller ones.
 inline constexpr double kLongEdgePercent = 10, kLostFeaturePercent = 0.2;
-/// So is one of which a region's volume differs by this many times what is aimed at.
+/// So is one of which a region's volume differs by this many times what is aimed at, or the volume of the whole solid:
+/// distances hide in a plate that is thinner than they are.
 inline constexpr double kFarOffVolumeFactor = 10;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
 /// edges, and of parts with them.
@@ -98,6 +99,8 @@ struct AutomaticFitTrial {
   double least_share = 0;  ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t uncertified = 0;
   double volume_percent = 0;  ///< largest difference of a region's volume from the target's, if it has regions
+  /// Difference of the solid's volume from the target's, if that has no regions and is closed.
+  double solid_volume_percent = 0;
   std::optional<std::size_t> self_intersections;  ///< pairs of triangles; empty: the search was interrupted
   /// A place at which the boundary met itself or cells were poor, and the mesh was relaxed, in the target's
   /// coordinates; empty: there was none.

@@ -17,14 +17,15 @@ constexpr double kQualityWeight = 5;  // of the share of the quality in the meri
 /// Cost of a boundary that meets itself, and of cells that are not certified: so much that a valid trial wins, however
 /// many edges an invalid one follows.
 constexpr double kNotValid = 10;
-/// Cost of long edges that are not followed, and of a feature that is lost: such a trial is far off, so that it is
-/// never good and is worth a refinement.
+/// Cost of long edges that are not followed, of a feature that is lost, and of a solid of another volume: such a trial
+/// is far off, so that it is never good and is worth a refinement.
 constexpr double kFarOff = 0.6;
 /// Returns true if a feature that is no noise is missed by more than its radius.
 bool loses_feature(const AutomaticFitTrial& trial) {
   const std::optional<FeatureMiss>& miss = trial.feature_miss;
   return miss && miss->share > 1 && miss->size_percent > kLostFeaturePercent;
 }
+constexpr double kMostVolumePercent = kFarOffVolumeFactor * kAutomaticVolumePercent;
 
 }  // namespace
 
@@ -51,12 +52,15 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
   const double least_acceptable = std::min(kAcceptableQuality, options.quality);
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
+  const bool is_far_off =
+      trial.long_edges_lost > 0 || loses_feature(trial) || trial.solid_volume_percent > kMostVolumePercent;
   return excess(trial.max_percent, options.max_tolerance_percent) +
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
+         std::min(kMostMiss, excess(trial.solid_volume_percent, kMostVolumePercent)) +
          kQualityWeight * (1 - trial.least_share) +
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
-         kEdgeWeight * (1 - trial.within_share) + (trial.long_edges_lost > 0 || loses_feature(trial) ? kFarOff : 0) +
+         kEdgeWeight * (1 - trial.within_share) + (is_far_off ? kFarOff : 0) +
          (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
 }
 
@@ -157,9 +161,10 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   if (loses_feature(chosen))
     reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", chosen.feature_miss->size,
                                 chosen.feature_miss->distance));
-  const double most_volume = kFarOffVolumeFactor * kAutomaticVolumePercent;
-  if (chosen.volume_percent > most_volume)
-    reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", most_volume));
+  if (chosen.volume_percent > kMostVolumePercent)
+    reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", kMostVolumePercent));
+  if (chosen.solid_volume_percent > kMostVolumePercent)
+    reasons.push_back(formatted("the volume differs from the target's by %.3g %%", chosen.solid_volume_percent));
   if (reasons.empty()) return;
   result.report.stop_reason = StopReason::tolerance_missed;
   for (const std::string& reason : reasons) result.report.explanation += "; " + reason;

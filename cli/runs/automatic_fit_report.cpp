@@ -3,6 +3,7 @@
 
 #include "cli/runs/check_report.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -31,6 +32,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"edges_within_share", trial.within_share},
                       {"mean_percent", trial.mean_percent},
                       {"max_percent", trial.max_percent},
+                      {"volume_percent", std::max(trial.volume_percent, trial.solid_volume_percent)},
                       {"feature_miss", feature_miss_json(trial.feature_miss)},
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
                       {"mean_scaled_jacobian", trial.mean_scaled_jacobian},

@@ -16,6 +16,8 @@
 #include "subvol/templates/label_surface.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 #include <sstream>
 #include <utility>
 #include <variant>
@@ -84,6 +86,16 @@ std::string place_line(const SurfacePlace& place) {
   return text + '\n';
 }
 
+/// Says how the references of cells have become numbers of regions.
+std::string renumbering(const std::filesystem::path& path, std::span<const int> references,
+                        std::span<const Group> regions) {
+  constexpr std::size_t kMost = 10;
+  std::string text = path.string() + ": a reference is below 1, so the regions are numbered anew:";
+  for (std::size_t i = 0; i < std::min(kMost, references.size()); ++i)
+    text += formatted("%s %d becomes %d", i == 0 ? "" : ",", references[i], regions[i].number);
+  return references.size() > kMost ? text + " and so on" : text;
+}
+
 SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, std::vector<std::string>& warnings) {
   if (is_label_grid_file(path)) throw UsageError("--wrap: " + path.string() + " is a segmentation, expected a surface");
   SurfaceRepair result;
@@ -130,8 +142,11 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
     const auto* cells = std::get_if<VolumeMesh>(&mesh);
     if (cells && region_references(*cells).size() > 1) {
       warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
+      const std::vector<int> references = region_references(*cells);
       SurfaceRepair loaded;
       loaded.regions = surface_of_regions(*cells);
+      if (loaded.regions->regions.front().number != references.front())
+        warnings.push_back(renumbering(path, references, loaded.regions->regions));
       loaded.surface = loaded.regions->mesh;
       return loaded;
     }

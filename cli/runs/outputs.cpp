@@ -11,6 +11,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <iostream>
 #include <set>
 #include <string_view>
@@ -93,6 +94,24 @@ void require_writable_folder(const fs::path& file) {
 
 void require_output_kind(const std::string& text) { (void)parse_output(text); }
 
+namespace {
+
+/// UsageError: a file exists that does not begin as those that replace it do, such as a surface that was meant as an
+/// input. Empty files and what is no regular file may be replaced.
+void require_kind(const fs::path& file, std::string_view begin, const char* option, const char* kind) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return;
+  std::string found(begin.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(found.data(), static_cast<std::streamsize>(found.size()));
+  found.resize(static_cast<std::size_t>(stream.gcount()));
+  if (!found.empty() && found != begin)
+    throw UsageError(std::string(option) + " " + file.string() + ": exists and is not " + kind +
+                     ", so it is not replaced; remove it first if that is meant");
+}
+
+}  // namespace
+
 void require_free(const fs::path& file, bool force) {
   std::error_code ignored;
   const bool exists = fs::exists(file, ignored);
@@ -149,10 +168,14 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
     std::error_code ignored;
     outputs.back().is_new = !fs::exists(outputs.back().path, ignored);
   }
-  if (!options.report.empty()) claim(options.report, options.force);
+  if (!options.report.empty()) {
+    claim(options.report, options.force);
+    require_kind(options.report, "{", "--report", "a report");
+  }
   // A run that resumes from a checkpoint may continue writing to it.
   if (!options.checkpoint.empty()) {
     claim(options.checkpoint, options.force || options.checkpoint == options.resume);
+    require_kind(options.checkpoint, "subvol checkpoint", "--checkpoint", "a checkpoint");
     std::error_code ignored;
     if (fs::is_fifo(options.checkpoint, ignored))
       throw UsageError("--checkpoint " + options.checkpoint + ": nothing can be read again from a pipe");

@@ -199,6 +199,7 @@ void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surfac
     if (output.extension == ".usda")
       throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
                        output.path.string());
+    require_for_curved_cells(output, order);
     if (output.extension != ".msh") continue;
     for (std::size_t f = 0; f < surface.num_faces(); ++f) {
       const CellKind kind =

@@ -6,6 +6,7 @@
 #include "cli/runs/viewing.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/animation.h"
 #include "subvol/export/boundary_file.h"
@@ -187,9 +188,12 @@ void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const H
   require_written(output.path, mesh, options);
 }
 
-void require_for_curved_cells(const Output& output) {
+void require_for_curved_cells(const Output& output, int order) {
   if (output.extension == ".usda")
     throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+  if (output.format().holds_cells && output.format().has_quadratic_cells_at_most() && order > 2)
+    throw UsageError(formatted("%s: cells of this format have order 2 at most, not %d; take .vtu, .msh or .mfem",
+                               output.path.string().c_str(), order));
 }
 
 bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
@@ -240,7 +244,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
   if (output.part == Part::region) return write_region(output, file, options);
   const HighOrderMesh& mesh = file.mesh;
-  require_for_curved_cells(output);
+  require_for_curved_cells(output, mesh.space.max_order());
   if (output.part == Part::boundary && output.extension == ".xdmf")
     return write_xdmf_faces(output, written_nodes(mesh, output.extension, file_options(file, {}, options)));
   if (output.part == Part::boundary || (!output.is_volume() && !output.is_scene())) {

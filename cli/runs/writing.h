@@ -61,8 +61,9 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 /// quality (.glb, .gltf) or as quads (.obj), or a cutaway. UsageError: .usda, which holds subdivision cages.
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
 
-/// UsageError, to be raised before the work: curved cells cannot be written to such a file (.usda).
-void require_for_curved_cells(const Output& output);
+/// UsageError, to be raised before the work: curved cells of this order cannot be written to such a file: none to
+/// .usda, and none above order 2 to formats of quadratic cells.
+void require_for_curved_cells(const Output& output, int order);
 
 /// Writes a limit surface's quads as .obj or .usda.
 void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options);

@@ -44,7 +44,7 @@ void convert_volume(const ConvertArguments& arguments, VolumeMesh mesh, std::vec
 int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& file, std::vector<Output>& outputs,
                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
-  for (const Output& output : outputs) require_for_curved_cells(output);
+  for (const Output& output : outputs) require_for_curved_cells(output, file.mesh.space.max_order());
   const auto is_set = [](int reference) { return reference != 0; };
   const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
   const Marks marks{.references = static_cast<std::size_t>(num_set), .groups = file.face_groups.groups.size()};

@@ -43,7 +43,7 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
                        const VolumeMesh& cells) {
   internal::require_no_pyramids(cells.kinds, "template mesh: pyramids cannot be curved");
   for (const Output& output : outputs) {
-    require_for_curved_cells(output);
+    require_for_curved_cells(output, arguments.fit.order);
     if (output.extension == ".msh") msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
   }
 }

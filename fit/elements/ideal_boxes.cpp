@@ -16,9 +16,15 @@ namespace {
 constexpr int kMaxSweeps = 200;
 constexpr double kSmallChange = 1e-3;
 
-/// Mean lengths of a cell's edges. Hex: along the three directions; prism: of the triangles' edges (twice) and of the
-/// upright edges; tet: of all edges (three times); pyramid: along the two directions of the base, and of the other
-/// edges.
+/// Logarithm of the mean length of a face's edges.
+double log_size(std::span<const Index> face, std::span<const Vec3> nodes) {
+  double sum = 0;
+  for (std::size_t i = 0; i < face.size(); ++i) sum += (nodes[face[(i + 1) % face.size()]] - nodes[face[i]]).norm();
+  return std::log(sum / static_cast<double>(face.size()));
+}
+
+}  // namespace
+
 Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
   const CellTopology& topology = cell_topology(kind);
   Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();
@@ -36,15 +42,6 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
   }
   return sums.cwiseQuotient(counts);
 }
-
-/// Logarithm of the mean length of a face's edges.
-double log_size(std::span<const Index> face, std::span<const Vec3> nodes) {
-  double sum = 0;
-  for (std::size_t i = 0; i < face.size(); ++i) sum += (nodes[face[(i + 1) % face.size()]] - nodes[face[i]]).norm();
-  return std::log(sum / static_cast<double>(face.size()));
-}
-
-}  // namespace
 
 std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
                               double own_share) {

@@ -9,6 +9,11 @@
 
 namespace subvol::internal {
 
+/// Returns the mean lengths of a cell's edges. Hex: along the three directions; prism: of the triangles' edges (twice)
+/// and of the upright edges; tet: of all edges (three times); pyramid: along the two directions of the base, and of the
+/// other edges.
+Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes);
+
 /// Lengths by which to stretch the ideal cell (`element_rule.h`) of each cell along its coordinates, between one size
 /// for all cells (own_share 0) and the cell's own size (1):
 ///

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/crisp_edges.h"
 
-#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/base/disjoint_sets.h"
 
 #include <Eigen/Geometry>
 
@@ -66,6 +66,25 @@ class Bends {
   double area_ = 0;
 };
 
+/// Diagonals of the bounding boxes of the parts of a surface that triangles connect.
+class PartDiagonals {
+ public:
+  explicit PartDiagonals(const TriangleMesh& mesh) : parts_(mesh.positions.size()), boxes_(mesh.positions.size()) {
+    for (const auto& [a, b, c] : mesh.triangles) {
+      parts_.join(a, b);
+      parts_.join(b, c);
+    }
+    for (const auto& t : mesh.triangles)
+      for (const Index v : t) boxes_[parts_.of(v)].extend(mesh.positions[v]);
+  }
+  /// That of the part with this vertex, which a triangle names.
+  double at(Index vertex) { return boxes_[parts_.of(vertex)].diagonal().norm(); }
+
+ private:
+  DisjointSets parts_;
+  std::vector<Eigen::AlignedBox3d> boxes_;
+};
+
 }  // namespace
 
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves) {
@@ -73,7 +92,7 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   EdgeCrispness result;
   if (curves.empty()) return result;
   const Bends bends(mesh, curves);
-  const double least_length = kLong * bounding_box_diagonal(mesh);
+  PartDiagonals diagonals(mesh);
   double all = 0, crisp = 0, long_crisp = 0;
   for (const FeatureCurve& curve : curves.curves) {
     double crisp_here = 0;
@@ -83,7 +102,7 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
     const double length = curve.length();
     all += length;
     crisp += crisp_here;
-    if (length > least_length && crisp_here > kMost * length) long_crisp += length;
+    if (length > kLong * diagonals.at(curve.vertices[0]) && crisp_here > kMost * length) long_crisp += length;
   }
   if (all > 0) result.crisp_share = crisp / all;
   if (bends.area() > 0) result.relative_length = long_crisp / std::sqrt(bends.area());

@@ -13,8 +13,8 @@ struct EdgeCrispness {
   /// Share of the curves' length along which no other edge of the two triangles bends by more than a third of the edge's
   /// own angle; edges that belong to curves do not count as others. 0 without curves.
   double crisp_share = 0;
-  /// Length of the curves that are crisp along most of their length and longer than 3 % of the diagonal, divided by the
-  /// square root of the surface's area.
+  /// Length of the curves that are crisp along most of their length and longer than 3 % of the diagonal of their
+  /// connected part, divided by the square root of the surface's area.
   double relative_length = 0;
 
   /// True for parts as they are designed, whose edges must stay. The bends of scans and sculptures exceed any angle in

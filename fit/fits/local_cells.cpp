@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
+#include "subvol/fit/elements/ideal_boxes.h"
+#include "subvol/fit/energies/quality_energy.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/templates/refine.h"
 
@@ -168,6 +170,21 @@ std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const d
   std::vector<Vec3> lengths(num_cells, Vec3::Constant(h));
   for (std::size_t c = 0; c < sizes.size(); ++c) lengths[c] *= sizes[c];
   return lengths;
+}
+
+void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, std::span<Vec3> lengths) {
+  const double share = QualityWeights{}.least_edge;
+  double longest = 0;
+  for (const Vec3& h : lengths) longest = std::max(longest, h.maxCoeff());
+  std::size_t num_flat = 0;
+  for (std::size_t c = 0; c < grid.num_cells(); ++c)
+    num_flat += box_lengths(grid.kinds[c], grid.cell(c), grid.positions).minCoeff() < share * longest;
+  if (2 * num_flat <= grid.num_cells()) return;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const Vec3 own = box_lengths(mesh.kinds[c], mesh.cell(c), mesh.positions);
+    for (int k = 0; k < 3; ++k)
+      if (own[k] > 0 && own[k] < share * lengths[c][k]) lengths[c][k] = own[k];
+  }
 }
 
 std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,

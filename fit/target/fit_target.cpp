@@ -7,6 +7,7 @@
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/sheets.h"
+#include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
 
@@ -68,7 +69,7 @@ std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {
 }
 
 FitTarget::FitTarget(const TriangleMesh& target)
-    : normalisation(target), mesh(normalised(target, normalisation)), tree(mesh), surface(mesh) {}
+    : normalisation(target), mesh(normalised(joined_at_open_edges(target), normalisation)), tree(mesh), surface(mesh) {}
 
 FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
     : normalisation(target), surface(normalised(target, normalisation), weights) {}

@@ -54,6 +54,7 @@ struct FitTarget {
   std::vector<double> region_volumes;  ///< `RegionSurface::volumes` in normalized coordinates
 
   /// InputError: as for `Normalisation`.
+  /// Vertices of the target's open edges in the same place count as one (`joined_at_open_edges`).
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
   /// Makes the outer surface of regions and their interfaces the target. A mesh that is to reproduce it must have

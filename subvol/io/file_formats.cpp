@@ -181,6 +181,8 @@ std::string extension_cell(const FileFormat& format) {
 
 }  // namespace
 
+bool FileFormat::has_quadratic_cells_at_most() const { return orders_written == kQuadratic; }
+
 std::span<const FileFormat> file_formats() { return kFormats; }
 
 const FileFormat* format_of_extension(std::string_view extension) {

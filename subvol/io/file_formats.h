@@ -27,6 +27,8 @@ struct FileFormat {
   Held regions_read = Held::none, regions_written = Held::none;  ///< references of cells
   bool holds_features = false;                  ///< creases and corners
   bool is_scene = false;                        ///< a scene is written: also cutaways and animations
+  /// True if cells of orders 1 and 2 are written, and none of higher ones.
+  bool has_quadratic_cells_at_most() const;
   bool needs_netcdf = false, needs_cgns = false, needs_assimp = false;  ///< the library without which it is refused
 };
 

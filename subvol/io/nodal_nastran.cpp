@@ -52,15 +52,20 @@ const std::vector<SolidCard>& solid_cards() {
   static const std::vector<SolidCard> kCards{
       {"CTETRA", CellKind::tet, 4, 10, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}},
       {"CPYRAM", CellKind::pyramid, 5, 5, {0, 1, 2, 3, 4}},
+      {"CPYRA", CellKind::pyramid, 5, 5, {0, 1, 2, 3, 4}},  // of OptiStruct and meshio
       {"CPENTA", CellKind::prism, 6, 15, {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11}},
       {"CHEXA", CellKind::hex, 8, 20, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15}},
   };
   return kCards;
 }
 
-/// Elements without a volume or a face of one.
-constexpr const char* kOtherElements[] = {"cbar",   "cbeam",  "crod", "conrod", "cbush", "celas1", "celas2",
-                                          "cshear", "ctube", "cgap", "cvisc",  "rbe2",  "rbe3"};
+/// Rigid elements. All other elements have names that begin with a C, as have the cards of coordinate systems (CORD2R
+/// and so on) and the end of the executive section (CEND).
+constexpr const char* kRigidElements[] = {"rbe1", "rbe2", "rbe3", "rbar", "rrod"};
+bool is_other_element(std::string_view name) {
+  if (name.starts_with("c")) return !name.starts_with("cord") && name != "cend";
+  return std::find(std::begin(kRigidElements), std::end(kRigidElements), name) != std::end(kRigidElements);
+}
 
 class NastranParser {
  public:
@@ -140,7 +145,7 @@ class NastranParser {
       read_shell(3);
     else if (name == "include" || name.starts_with("include ")) fail("INCLUDE is not followed: put the files together");
     else if (name == "grdset") fail("GRDSET is not read: write the coordinate systems of the points themselves");
-    else if (std::find(std::begin(kOtherElements), std::end(kOtherElements), name) != std::end(kOtherElements))
+    else if (is_other_element(name))
       ++num_others_;
   }
 

@@ -15,21 +15,13 @@ namespace subvol::internal {
 
 namespace {
 
-/// Returns, for each vertex that a triangle names, the smallest number of a vertex in the same place; kNoIndex for the
-/// others.
-std::vector<Index> first_in_place(const TriangleMesh& surface) {
-  std::vector<char> used(surface.positions.size(), 0);
-  for (const auto& t : surface.triangles)
-    for (Index v : t) {
-      if (v < 0 || static_cast<std::size_t>(v) >= used.size() || !surface.positions[v].allFinite())
-        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
-      used[v] = 1;
-    }
+/// Returns, for each of these vertices, the smallest number of one of them in the same place; kNoIndex for the others.
+std::vector<Index> first_in_place(std::span<const Vec3> positions, std::span<const char> used) {
   std::vector<Index> order;
   for (std::size_t v = 0; v < used.size(); ++v)
     if (used[v]) order.push_back(static_cast<Index>(v));
   const auto compared = [&](Index a, Index b) {
-    const Vec3 &p = surface.positions[a], &q = surface.positions[b];
+    const Vec3 &p = positions[a], &q = positions[b];
     for (int i = 0; i < 3; ++i)
       if (p[i] != q[i]) return p[i] < q[i] ? -1 : 1;
     return 0;
@@ -44,7 +36,40 @@ std::vector<Index> first_in_place(const TriangleMesh& surface) {
   return first;
 }
 
+/// The same for the vertices that a triangle names.
+std::vector<Index> first_in_place(const TriangleMesh& surface) {
+  std::vector<char> used(surface.positions.size(), 0);
+  for (const auto& t : surface.triangles)
+    for (Index v : t) {
+      if (v < 0 || static_cast<std::size_t>(v) >= used.size() || !surface.positions[v].allFinite())
+        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
+      used[v] = 1;
+    }
+  return first_in_place(surface.positions, used);
+}
+
 }  // namespace
+
+TriangleMesh joined_at_open_edges(TriangleMesh surface) {
+  const std::size_t num_vertices = surface.positions.size();
+  std::vector<std::array<Index, 3>> proper;  // with three different corners
+  for (const auto& t : surface.triangles) {
+    for (const Index v : t)
+      if (v < 0 || static_cast<std::size_t>(v) >= num_vertices) return surface;
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) proper.push_back(t);
+  }
+  std::vector<char> is_open(num_vertices, 0);
+  for_each_edge(sorted_half_edges(proper, num_vertices), [&](std::span<const SurfaceHalfEdge> sides) {
+    if (sides.size() == 1) is_open[sides[0].low] = is_open[sides[0].high] = 1;
+  });
+  for (std::size_t v = 0; v < num_vertices; ++v)
+    if (!surface.positions[v].allFinite()) is_open[v] = 0;
+  const std::vector<Index> first = first_in_place(surface.positions, is_open);
+  for (auto& t : surface.triangles)
+    for (Index& v : t)
+      if (first[v] != kNoIndex) v = first[v];
+  return surface;
+}
 
 WeldedSurface welded(const TriangleMesh& surface) {
   const std::vector<Index> first = first_in_place(surface);

@@ -24,6 +24,13 @@ struct WeldedSurface {
 /// vertices.
 WeldedSurface welded(const TriangleMesh& surface);
 
+/// Merges the vertices of open edges that have equal positions, so that faces are connected to which a file gives
+/// vertices of their own, as for flat shading. Closed parts that touch stay apart.
+///
+/// Vertices and triangles keep their numbers; vertices that were merged are not named any more. A surface in which a
+/// triangle names a vertex that is not there is returned as it is. Cost: a sort of the edges.
+TriangleMesh joined_at_open_edges(TriangleMesh surface);
+
 /// One side of a triangle.
 struct SurfaceHalfEdge {
   Index low, high;  ///< its vertices, the smaller number first

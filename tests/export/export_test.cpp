@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/export/export.h"
+#include "subvol/export/surface_writer.h"
 
 #include "subvol/base/error.h"
 #include "subvol/export/gltf_writer.h"
@@ -239,4 +240,17 @@ TEST_CASE("a scene of sheets has a node for each with its attribute and colours,
   CHECK_NOTHROW(gltf_bytes(scene, GltfContainer::glb));
   CHECK_THROWS_AS(sheet_scene({}, ""), InputError);
   CHECK_THROWS_AS(sheet_scene(std::vector<SceneSheet>{{.name = "x", .mesh = square, .shades = {1}}}, ""), InputError);
+}
+
+TEST_CASE("A surface far from the origin is written to .stl without loss") {
+  PolygonMesh triangle;
+  const Vec3 origin(5e5, 4.5e6, 100);
+  triangle.positions = {origin, origin + Vec3(0.1, 0, 0), origin + Vec3(0, 0.1, 0)};
+  triangle.face_vertices = {0, 1, 2};
+  triangle.face_offsets = {0, 3};
+  const std::string text = surface_bytes(".stl", triangle);
+  CHECK(text.starts_with("solid "));
+  CHECK(text.find("4500000.1") != std::string::npos);
+  for (Vec3& p : triangle.positions) p -= origin;
+  CHECK_FALSE(surface_bytes(".stl", triangle).starts_with("solid "));
 }

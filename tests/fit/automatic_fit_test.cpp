@@ -32,6 +32,37 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
   CHECK(result.trials[result.chosen].cells == result.mesh.num_cells());
 }
 
+TEST_CASE("A plate a hundred times as wide as thick keeps its thickness", "[slow]") {
+  TriangleMesh plate = test::cube_surface(2, false);
+  for (Vec3& p : plate.positions) p.z() /= 100;
+  const AutomaticFitResult result = fit_automatically(plate, {.cells = 300});
+  const AutomaticFitTrial& chosen = result.trials[result.chosen];
+  CHECK(chosen.solid_volume_percent < 1e-6);
+  CHECK(chosen.max_percent < 1e-6);
+  CHECK(result.report.stop_reason == StopReason::converged);
+}
+
+TEST_CASE("A result of another volume is far off, however near it is") {
+  AutomaticFitTrial trial;
+  trial.least_scaled_jacobian = trial.least_share = 0.7;
+  trial.self_intersections = 0;
+  trial.solid_volume_percent = 0.5;
+  CHECK(internal::merit_of(trial, {}) < 2);
+  AutomaticFitResult result;
+  result.trials = {trial};
+  result.report.stop_reason = StopReason::converged;
+  internal::mark_if_far_off(result, {}, "edges");
+  CHECK(result.report.stop_reason == StopReason::converged);
+  result.trials[0].solid_volume_percent = 2;
+  internal::mark_if_far_off(result, {}, "edges");
+  CHECK(result.report.stop_reason == StopReason::tolerance_missed);
+  CHECK_FALSE(internal::is_good_enough([&] {
+    trial.solid_volume_percent = 2;
+    trial.merit = internal::merit_of(trial, {});
+    return trial;
+  }()));
+}
+
 TEST_CASE("All oblique faces of a part get pads, also where five of them meet at a corner", "[slow]") {
   const TriangleMesh target = test::icosahedron_surface();
   const AutomaticFitResult result = fit_automatically(target, {.cells = 3500});

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/crisp_edges.h"
+#include "subvol/surface/welded_surface.h"
 #include "tests/support/feature_fixtures.h"
+#include "tests/support/region_fixtures.h"
 
 #include <catch2/catch.hpp>
 
@@ -24,6 +26,23 @@ TriangleMesh rough_block(double height) {
   return mesh;
 }
 
+/// The same triangles, each with vertices of its own.
+TriangleMesh soup(const TriangleMesh& mesh) {
+  TriangleMesh result;
+  for (const auto& t : mesh.triangles) {
+    const auto first = static_cast<Index>(result.positions.size());
+    for (const Index v : t) result.positions.push_back(mesh.positions[v]);
+    result.triangles.push_back({first, first + 1, first + 2});
+  }
+  return result;
+}
+
+void append(TriangleMesh& mesh, const TriangleMesh& other) {
+  const auto first = static_cast<Index>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& [a, b, c] : other.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
+}
+
 }  // namespace
 
 TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
@@ -35,4 +54,24 @@ TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
   CHECK(has_edges_to_follow(stone, 40, true));
   CHECK_FALSE(has_edges_to_follow(stone, 40, false));
   CHECK(edge_crispness(cube, feature_curves(cube, 40)).crisp_share == Approx(1));
+}
+
+TEST_CASE("Faces with vertices of their own are joined, closed parts that touch are not") {
+  const TriangleMesh box = box_surface(Vec3::Zero(), Vec3(1, 2, 3));
+  const TriangleMesh joined = joined_at_open_edges(soup(box));
+  CHECK(feature_curves(soup(box), 40).curves.empty());
+  CHECK(feature_curves(joined, 40).curves.size() == 12);
+  CHECK(joined.positions.size() == 3 * box.triangles.size());
+  TriangleMesh touching = box;
+  append(touching, box_surface(Vec3(1, 0, 0), Vec3(2, 2, 3)));
+  CHECK(joined_at_open_edges(touching).triangles == touching.triangles);
+  TriangleMesh wrong = box;
+  wrong.triangles[0][0] = 1000;
+  CHECK(joined_at_open_edges(wrong).triangles == wrong.triangles);
+}
+
+TEST_CASE("Edges are judged by the size of their part") {
+  TriangleMesh boxes = box_surface(Vec3::Zero(), Vec3::Ones());
+  append(boxes, box_surface(Vec3(1000, 0, 0), Vec3(1001, 1, 1)));
+  CHECK(has_edges_to_follow(boxes, 40, false));
 }

@@ -363,6 +363,23 @@ TEST_CASE("nodal_mesh: small, large and free fields of Nastran, with its numbers
   CHECK_THAT(nodal_refusal("a.bdf", "CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
 }
 
+TEST_CASE("Pyramids of Nastran have two names, and elements of unknown names are counted") {
+  std::string text = "BEGIN BULK\nCORD2R,1\n";
+  const Vec3 points[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
+  for (int i = 0; i < 5; ++i)
+    text += "GRID," + std::to_string(i + 1) + ",," + std::to_string(points[i].x()) + "," +
+            std::to_string(points[i].y()) + "," + std::to_string(points[i].z()) + "\n";
+  for (const char* name : {"CPYRA", "CPYRAM"}) {
+    const NodalMesh mesh = read("a.bdf", text + name + ",1,1,1,2,3,4,5\nENDDATA\n");
+    REQUIRE(mesh.num_cells() == 1);
+    CHECK(mesh.warnings.empty());
+  }
+  const NodalMesh mesh = read("a.bdf", text + "CPYRA,1,1,1,2,3,4,5\nCTETRX,2,1,1,2,3,5\nENDDATA\n");
+  CHECK(mesh.num_cells() == 1);
+  REQUIRE(mesh.warnings.size() == 1);
+  CHECK_THAT(mesh.warnings[0], Contains("1") && Contains("other elements"));
+}
+
 // --- MFEM -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
