@@ -6,6 +6,11 @@
 #include "subvol/export/text_format.h"
 
 #include <algorithm>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace subvol {
 
@@ -13,11 +18,20 @@ using namespace internal;
 
 namespace {
 
-/// Returns the name of a group as one word: blanks would separate the names of several groups.
-std::string group_name(const Group& group) {
-  std::string name = label_of(group);
-  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '#' || c == '\\'; }, '_');
-  return name;
+/// Returns the names of groups as one word each, since blanks would separate the names of several groups; no two are
+/// the same.
+std::vector<std::string> group_names(std::span<const Group> groups) {
+  std::vector<std::string> names;
+  std::set<std::string> taken;
+  for (const Group& group : groups) {
+    std::string word = label_of(group);
+    std::replace_if(
+        word.begin(), word.end(), [](unsigned char c) { return c <= ' ' || c == '#' || c == '\\'; }, '_');
+    std::string name = word;
+    for (int n = 2; !taken.insert(name).second; ++n) name = word + '_' + std::to_string(n);
+    names.push_back(std::move(name));
+  }
+  return names;
 }
 
 }  // namespace
@@ -30,10 +44,11 @@ std::string obj_text(const PolygonMesh& mesh, const std::string& name) {
     append_vector(text, position, " ");
     text += '\n';
   }
+  const std::vector<std::string> names = group_names(mesh.face_groups.groups);
   Index group = kNoIndex;
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
     if (const Index next = mesh.face_groups.empty() ? kNoIndex : mesh.face_groups.of_face[f]; next != group) {
-      text += next == kNoIndex ? "g\n" : "g " + group_name(mesh.face_groups.groups[next]) + '\n';
+      text += next == kNoIndex ? "g\n" : "g " + names[static_cast<std::size_t>(next)] + '\n';
       group = next;
     }
     text += 'f';

@@ -207,7 +207,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   const MeshTopology topology(mesh_);
   const std::vector<double> sizes = cage_ ? cage_->of_children(sizes_) : sizes_;
   std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
-  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid.mesh, mesh_, lengths);
+  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid.mesh, mesh_, QualityWeights{}.least_edge, lengths);
   const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of(mesh_);
   sample_target(topology.boundary_faces().size());
   QualityBoundary boundary{

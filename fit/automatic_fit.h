@@ -37,9 +37,11 @@ inline constexpr double kFarOffFactor = 2;
 /// more than its radius, if the radius is at least this, in percent of the diagonal: noise of a triangulation looks
 /// like smaller ones.
 inline constexpr double kLongEdgePercent = 10, kLostFeaturePercent = 0.2;
-/// So is one of which a region's volume differs by this many times what is aimed at, or the volume of the whole solid:
-/// distances hide in a plate that is thinner than they are.
+/// So is one of which a region's volume differs by this many times what is aimed at.
 inline constexpr double kFarOffVolumeFactor = 10;
+/// So is one of which the volume of the only solid differs by this much, in percent of it: a plate that is thinner than
+/// the distances may come out several times as thick.
+inline constexpr double kFarOffSolidVolumePercent = 5;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
 /// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};

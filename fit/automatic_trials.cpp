@@ -25,7 +25,6 @@ bool loses_feature(const AutomaticFitTrial& trial) {
   const std::optional<FeatureMiss>& miss = trial.feature_miss;
   return miss && miss->share > 1 && miss->size_percent > kLostFeaturePercent;
 }
-constexpr double kMostVolumePercent = kFarOffVolumeFactor * kAutomaticVolumePercent;
 
 }  // namespace
 
@@ -53,11 +52,11 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
   const bool is_far_off =
-      trial.long_edges_lost > 0 || loses_feature(trial) || trial.solid_volume_percent > kMostVolumePercent;
+      trial.long_edges_lost > 0 || loses_feature(trial) || trial.solid_volume_percent > kFarOffSolidVolumePercent;
   return excess(trial.max_percent, options.max_tolerance_percent) +
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
-         std::min(kMostMiss, excess(trial.solid_volume_percent, kMostVolumePercent)) +
+         std::min(kMostMiss, excess(trial.solid_volume_percent, kFarOffSolidVolumePercent)) +
          kQualityWeight * (1 - trial.least_share) +
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
          kEdgeWeight * (1 - trial.within_share) + (is_far_off ? kFarOff : 0) +
@@ -161,9 +160,10 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   if (loses_feature(chosen))
     reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", chosen.feature_miss->size,
                                 chosen.feature_miss->distance));
-  if (chosen.volume_percent > kMostVolumePercent)
-    reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", kMostVolumePercent));
-  if (chosen.solid_volume_percent > kMostVolumePercent)
+  const double most_volume = kFarOffVolumeFactor * kAutomaticVolumePercent;
+  if (chosen.volume_percent > most_volume)
+    reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", most_volume));
+  if (chosen.solid_volume_percent > kFarOffSolidVolumePercent)
     reasons.push_back(formatted("the volume differs from the target's by %.3g %%", chosen.solid_volume_percent));
   if (reasons.empty()) return;
   result.report.stop_reason = StopReason::tolerance_missed;

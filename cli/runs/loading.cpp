@@ -157,6 +157,11 @@ FittedTarget fitted_target(const Target& target, const VolumeMesh& mesh) {
   return {std::move(matched.regions), matched.outer ? Target(*std::move(matched.outer)) : target};
 }
 
+Target outer_target(const Target& target, const VolumeMesh& mesh) {
+  FittedTarget fitted = fitted_target(target, mesh);
+  return fitted.regions ? Target(outer_surface(*fitted.regions)) : std::move(fitted.outer);
+}
+
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   return surface_of(content_of(path, warnings, true, {}), path, warnings);
 }

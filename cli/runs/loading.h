@@ -54,6 +54,8 @@ struct FittedTarget {
 };
 /// Returns it for a template (`matched_target`); of points, all of them.
 FittedTarget fitted_target(const Target& target, const VolumeMesh& template_mesh);
+/// Returns what the boundary of a mesh is compared with: if sheets divide a target into regions, its outer surface.
+Target outer_target(const Target& target, const VolumeMesh& mesh);
 /// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);

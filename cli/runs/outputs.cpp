@@ -11,7 +11,6 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <iostream>
 #include <set>
 #include <string_view>
@@ -96,18 +95,12 @@ void require_output_kind(const std::string& text) { (void)parse_output(text); }
 
 namespace {
 
-/// UsageError: a file exists that does not begin as those that replace it do, such as a surface that was meant as an
-/// input. Empty files and what is no regular file may be replaced.
-void require_kind(const fs::path& file, std::string_view begin, const char* option, const char* kind) {
-  std::error_code ignored;
-  if (!fs::is_regular_file(file, ignored)) return;
-  std::string found(begin.size(), '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(found.data(), static_cast<std::streamsize>(found.size()));
-  found.resize(static_cast<std::size_t>(stream.gcount()));
-  if (!found.empty() && found != begin)
-    throw UsageError(std::string(option) + " " + file.string() + ": exists and is not " + kind +
-                     ", so it is not replaced; remove it first if that is meant");
+/// UsageError: a file that is neither a mesh nor a surface has the extension of one, as if an input were named by
+/// mistake.
+void refuse_model(const fs::path& file, const char* option, const char* kind) {
+  if (format_of_path(file) || file.extension() == ".xyz")
+    throw UsageError(std::string(option) + " " + file.string() + ": " + file.extension().string() +
+                     " is an extension of models; expected a name for " + kind);
 }
 
 }  // namespace
@@ -170,12 +163,12 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
   }
   if (!options.report.empty()) {
     claim(options.report, options.force);
-    require_kind(options.report, "{", "--report", "a report");
+    refuse_model(options.report, "--report", "a report, such as report.json");
   }
   // A run that resumes from a checkpoint may continue writing to it.
   if (!options.checkpoint.empty()) {
     claim(options.checkpoint, options.force || options.checkpoint == options.resume);
-    require_kind(options.checkpoint, "subvol checkpoint", "--checkpoint", "a checkpoint");
+    refuse_model(options.checkpoint, "--checkpoint", "a checkpoint");
     std::error_code ignored;
     if (fs::is_fifo(options.checkpoint, ignored))
       throw UsageError("--checkpoint " + options.checkpoint + ": nothing can be read again from a pipe");

@@ -19,6 +19,7 @@
 
 #include <iostream>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 namespace subvol::cli {
@@ -51,7 +52,8 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
 
 Checked check_linear(const CheckArguments& arguments, const VolumeMesh& mesh, const std::optional<Target>& target,
                      const WorkProgress& progress) {
-  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
+  const std::optional<Target> outer = target ? std::optional(outer_target(*target, mesh)) : std::nullopt;
+  Checked checked{against(outer, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   if (target && checked.check.quality) checked.groups = compare_groups(*target, mesh);
@@ -123,8 +125,11 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
   std::string text = to_text(diagnosis);
   if (!diagnosis.is_cancelled && diagnosis.parts.size() > 1)
     if (const std::optional<RegionSurface> regions = find_regions(surface.mesh)) {
+      // A sheet between two regions counts for none in the sum over the triangles.
+      diagnosis.volume = std::accumulate(regions->volumes.begin(), regions->volumes.end(), 0.0);
+      json["volume"] = diagnosis.volume;
       json["regions"] = regions_json(*regions);
-      text = to_text(*regions) + text;
+      text = to_text(*regions) + to_text(diagnosis);
     }
   if (!diagnosis.is_cancelled && !diagnosis.is_fillable()) {
     const FillingForecast forecast = forecast_filling(arguments.mesh);

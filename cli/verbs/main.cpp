@@ -68,6 +68,16 @@ void keep_freed_memory() {
 #endif
 }
 
+/// Blocks (SIG_BLOCK) or delivers (SIG_UNBLOCK) the signals that end a run in order. A program that is started again
+/// inherits which ones are blocked.
+void hold_signals(int how) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  sigprocmask(how, &signals, nullptr);
+}
+
 /// Starts the program again with settings that runtime libraries read when they are loaded, unless the user has set
 /// them.
 ///
@@ -89,6 +99,7 @@ void restart_with_settings(char** argv) {
   std::array<char, 4096> program{};  // longer paths are not followed
   const ssize_t length = readlink("/proc/self/exe", program.data(), program.size());
   if (length <= 0 || static_cast<std::size_t>(length) == program.size()) return;
+  hold_signals(SIG_BLOCK);      // until they can be answered
   execv(program.data(), argv);  // returns if the system refuses; then all goes on as it is
 #endif
 }
@@ -121,6 +132,7 @@ int main(int argc, char** argv) {
   std::set_terminate(end_in_order);
   std::signal(SIGXFSZ, SIG_IGN);  // reaching the limit on file sizes becomes a write error, like a full disk
   subvol::cli::end_on_interrupt();
+  hold_signals(SIG_UNBLOCK);
   prepare_standard_output();
   return finished_standard_output(run_to_status(argc, argv));
 }

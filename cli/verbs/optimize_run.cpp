@@ -88,7 +88,8 @@ void OptimizeRun::load() {
   mesh_ = std::get<VolumeMesh>(std::move(cells));
   require_regions(outputs_, regions_of(mesh_));
   warn_of_losses(marks_of(mesh_), marks_of(mesh_), outputs_, warnings_);
-  if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
+  if (!arguments_.target.empty())
+    target_ = std::get<TriangleMesh>(outer_target(load_surface(arguments_.target, warnings_), mesh_));
   surface_ = target_ ? *target_ : fan_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);
   tell_warnings();

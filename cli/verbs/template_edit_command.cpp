@@ -17,6 +17,7 @@
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/shell/extrude.h"
+#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/carve.h"
 #include "subvol/templates/cell_split.h"
 #include "subvol/templates/pillow.h"
@@ -32,6 +33,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace subvol::cli {
@@ -82,13 +84,21 @@ VolumeMesh make_grid(EditArguments& arguments) {
                         : box_grid(low, high, {arguments.counts[0], arguments.counts[1], arguments.counts[2]}));
 }
 
+/// Loads the surface of --inside. Nothing lies inside a surface that faces inward, so it is turned.
+TriangleMesh load_outward(EditArguments& arguments) {
+  TriangleMesh surface = load_surface(arguments.inside, arguments.warnings);
+  if (internal::signed_volume_of(surface) >= 0) return surface;
+  for (auto& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
+  arguments.warnings.push_back(arguments.inside + ": its triangles face inward; they were turned");
+  return surface;
+}
+
 /// The cells selected by --inside, --box, --list or --thin, of which exactly one must be given.
 std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh, const std::string& choices) {
   const int given = !arguments.inside.empty() + !arguments.box.empty() + !arguments.cells.empty() + arguments.thin;
   if (given != 1) throw UsageError("template " + choices);
   if (arguments.thin) return thin_cells(mesh);
-  if (!arguments.inside.empty())
-    return cells_inside(mesh, load_surface(arguments.inside, arguments.warnings), arguments.share);
+  if (!arguments.inside.empty()) return cells_inside(mesh, load_outward(arguments), arguments.share);
   return arguments.box.empty() ? cells_listed(mesh, arguments.cells)
                                : cells_in_box(mesh, low_corner(arguments.box), high_corner(arguments.box));
 }

@@ -2,7 +2,6 @@
 #include "subvol/fit/fits/local_cells.h"
 
 #include "subvol/fit/elements/ideal_boxes.h"
-#include "subvol/fit/energies/quality_energy.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/templates/refine.h"
 
@@ -172,8 +171,7 @@ std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const d
   return lengths;
 }
 
-void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, std::span<Vec3> lengths) {
-  const double share = QualityWeights{}.least_edge;
+void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, double share, std::span<Vec3> lengths) {
   double longest = 0;
   for (const Vec3& h : lengths) longest = std::max(longest, h.maxCoeff());
   std::size_t num_flat = 0;

@@ -82,8 +82,9 @@ std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const d
 /// grid     the grid that the mesh was made from. Nothing is done unless most of its cells are flat. Flat cells at a
 ///          ledge or a thin wall of another part are better off if they become thicker: for those of a nut's block, the
 ///          least scaled Jacobians of the first trials fell from 0.37 and more to 0.06 and less.
+/// share    cells are flat if an edge is shorter than this share of the wanted length (`QualityWeights::least_edge`).
 /// lengths  of the mesh's cells.
-void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, std::span<Vec3> lengths);
+void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, double share, std::span<Vec3> lengths);
 
 /// Returns how many times links of creases count at each sample (`CreaseEnergy::weigh`). `QualityStages` measure
 /// distances in units of the cells: a face counts as much as another one, whatever its size, and so must an edge.

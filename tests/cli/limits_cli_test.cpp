@@ -223,14 +223,13 @@ TEST_CASE("A report or checkpoint without room costs nothing else", "[cli][disk]
   CHECK(place.json("r.json").at("warnings").size() >= 1);
 }
 
-TEST_CASE("A report or a checkpoint does not replace a file of another kind, nor is a whole fit lost to an order",
-          "[cli]") {
+TEST_CASE("A report or a checkpoint does not replace a model, nor is a whole fit lost to an order", "[cli]") {
   const Workplace place;
   const std::string before = content_of(place / "target.off");
   for (const char* option : {"--report", "--checkpoint"}) {
     const Run run = place.run(kFit + "-o out.mesh --force " + option + " target.off");
     CHECK(run.status == 2);
-    CHECK_THAT(run.err, Catch::Contains("target.off: exists and is not"));
+    CHECK_THAT(run.err, Catch::Contains("target.off: .off is an extension of models"));
     CHECK(content_of(place / "target.off") == before);
   }
   const Run run = place.run(kFit + "--order 3 -o out.inp");

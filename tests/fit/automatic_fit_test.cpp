@@ -46,18 +46,18 @@ TEST_CASE("A result of another volume is far off, however near it is") {
   AutomaticFitTrial trial;
   trial.least_scaled_jacobian = trial.least_share = 0.7;
   trial.self_intersections = 0;
-  trial.solid_volume_percent = 0.5;
+  trial.solid_volume_percent = 3;
   CHECK(internal::merit_of(trial, {}) < 2);
   AutomaticFitResult result;
   result.trials = {trial};
   result.report.stop_reason = StopReason::converged;
   internal::mark_if_far_off(result, {}, "edges");
   CHECK(result.report.stop_reason == StopReason::converged);
-  result.trials[0].solid_volume_percent = 2;
+  result.trials[0].solid_volume_percent = 8;
   internal::mark_if_far_off(result, {}, "edges");
   CHECK(result.report.stop_reason == StopReason::tolerance_missed);
   CHECK_FALSE(internal::is_good_enough([&] {
-    trial.solid_volume_percent = 2;
+    trial.solid_volume_percent = 8;
     trial.merit = internal::merit_of(trial, {});
     return trial;
   }()));
