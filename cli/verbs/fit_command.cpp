@@ -17,6 +17,7 @@
 #include "cli/verbs/commands.h"
 #include "cli/verbs/high_order_fit_run.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/base/format.h"
 #include "subvol/base/version.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/subdivision_fit.h"
@@ -169,6 +170,12 @@ void FitRun::fit() {
                       target_);
   });
   checkpointing_->finish(result_.report.warnings);
+  constexpr std::size_t kFarMore = 2;  // times the cells asked for; templates have about as many as they should
+  if (arguments_.cells && result_.mesh.num_cells() > kFarMore * *arguments_.cells)
+    result_.report.warnings.push_back(internal::formatted(
+        "the result has %zu cells, though %zu were asked for: its template has %zu, and --levels %d subdivides "
+        "these; ask for fewer levels",
+        result_.mesh.num_cells(), *arguments_.cells, template_mesh_.num_cells(), options.levels));
   add_warnings(result_.report.warnings);
   groups_ = carry_groups(outer_, result_.mesh);
   carry_groups(outer_, result_.cage);
