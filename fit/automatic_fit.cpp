@@ -24,7 +24,6 @@
 #include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/quality_stages.h"
-#include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
@@ -152,16 +151,13 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   options.progress = begin_template();
   AutoTemplateResult made = auto_templates(original_, options, 1);
   result_.topology = made.wanted;
-  if (made.cancelled) {
+  if (!made.cancelled && made.templates.empty() && !diagnosis_)
+    diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
+  if (made.cancelled || (diagnosis_ && diagnosis_->is_cancelled)) {
     note_end_in_template();
     return std::nullopt;
   }
   if (made.templates.empty()) {
-    if (!diagnosis_) diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
-    if (diagnosis_->is_cancelled) {
-      note_end_in_template();
-      return std::nullopt;
-    }
     no_template_ = "target: " + why_no_grid(*diagnosis_, options.cells, made.wanted) + "; give a --template";
     return std::nullopt;
   }
@@ -295,10 +291,7 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   measure(surface);
   if (cage_) measure(cage_->limit_surface());
   trial.feature_miss = feature_miss(surface);
-  if (target_.surface.volume_source() == VolumeSource::signed_sum) {
-    const double volume = signed_volume(surface.positions, surface.triangles);
-    trial.solid_volume_percent = 100 * std::abs(volume / target_.surface.volume() - 1);
-  }
+  trial.solid_volume_percent = volume_difference_percent(surface, target_.surface);
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();

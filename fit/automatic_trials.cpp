@@ -3,9 +3,11 @@
 
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/templates/auto_template.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace subvol::internal {
 
@@ -61,6 +63,11 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
          kEdgeWeight * (1 - trial.within_share) + (is_far_off ? kFarOff : 0) +
          (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
+}
+
+double volume_difference_percent(const TriangleMesh& boundary, const TargetSurface& target) {
+  if (target.volume_source() != VolumeSource::signed_sum) return 0;
+  return 100 * std::abs(signed_volume(boundary.positions, boundary.triangles) / target.volume() - 1);
 }
 
 double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& options) {

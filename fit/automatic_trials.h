@@ -5,6 +5,7 @@
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <cstddef>
 #include <optional>
@@ -36,6 +37,10 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options);
 
 /// Returns how far a trial is from its aims: the formula in `fit_automatically`.
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);
+
+/// Returns the difference of the volume inside a closed boundary from that of the target, in percent of the latter; 0
+/// if the target is not closed.
+double volume_difference_percent(const TriangleMesh& boundary, const TargetSurface& target);
 
 /// Returns the merit that a trial would have if its boundary did not meet itself and no cell were worse than
 /// acceptable.

@@ -77,7 +77,7 @@ class PartDiagonals {
     for (const auto& t : mesh.triangles)
       for (const Index v : t) boxes_[parts_.of(v)].extend(mesh.positions[v]);
   }
-  /// That of the part with this vertex, which a triangle names.
+  /// Returns the diagonal of the part to which a vertex belongs. The vertex must be a corner of a triangle.
   double at(Index vertex) { return boxes_[parts_.of(vertex)].diagonal().norm(); }
 
  private:

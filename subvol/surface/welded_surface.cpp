@@ -36,7 +36,7 @@ std::vector<Index> first_in_place(std::span<const Vec3> positions, std::span<con
   return first;
 }
 
-/// The same for the vertices that a triangle names.
+/// Returns the same for all vertices that are corners of a triangle.
 std::vector<Index> first_in_place(const TriangleMesh& surface) {
   std::vector<char> used(surface.positions.size(), 0);
   for (const auto& t : surface.triangles)

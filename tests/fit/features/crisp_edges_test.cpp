@@ -26,7 +26,7 @@ TriangleMesh rough_block(double height) {
   return mesh;
 }
 
-/// The same triangles, each with vertices of its own.
+/// Returns the triangles of a mesh, each with vertices of its own.
 TriangleMesh soup(const TriangleMesh& mesh) {
   TriangleMesh result;
   for (const auto& t : mesh.triangles) {
