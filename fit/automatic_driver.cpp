@@ -244,11 +244,10 @@ bool AutomaticDriver::polish() {
 }
 
 bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,
-                                   std::optional<CreaseDistance> edges, std::span<const UnfollowedCurve> unfollowed,
-                                   const FeatureCurves& curves) {
+                                   std::optional<CreaseDistance> edges, std::span<const UnfollowedCurve> unfollowed) {
   trial.least_share = state_.cells.least_share;
   if (edges) edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
-  std::vector<MissedEdge> missed = missed_edges(unfollowed, curves, target_.normalisation);
+  std::vector<MissedEdge> missed = missed_edges(unfollowed, target_.normalisation);
   trial.long_edges_lost = num_long_edges_lost(missed);
   if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
   result_.cage = cage_ ? cage_->cage : VolumeMesh();

@@ -103,7 +103,7 @@ class AutomaticDriver {
   void sample_target(std::size_t faces);
   /// Adds a trial that was measured; its mesh is the present one. Returns true if it is the best one.
   bool keep_if_best(AutomaticFitTrial trial, const QualityReport& quality, std::optional<CreaseDistance> edges,
-                    std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves);
+                    std::span<const UnfollowedCurve> unfollowed);
   /// Brings the result into the target's coordinates.
   AutomaticFitResult finish();
 

@@ -251,9 +251,10 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
 std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   if (edges_.features.curves.empty()) return std::nullopt;
   if (cage_ && layout_)
-    return level_layout_.creases.distance(cage_->limit().crease_edges, cage_->limit_surface().positions, 1);
-  const std::vector<CreaseSegment> none;
-  return crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
+    return level_layout_.creases.distance(cage_->limit().crease_edges, cage_->limit_surface().positions, 1,
+                                          &edges_.features.curves);
+  if (!layout_) return crease_distance(edges_.features.curves, mesh_.positions, {}, 1);
+  return crease_distance(edges_.features.curves, mesh_.positions, layout_->segments, 1, &layout_->creases.curves());
 }
 
 /// Returns the curves that the present mesh does not follow: all of them if it follows none.
@@ -263,7 +264,8 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
   const std::vector<FeatureCurve>& curves = edges_.features.curves.curves;
   for (std::size_t c = 0; c < curves.size(); ++c) {
     const ArcLength arc(curves[c].points);
-    all.push_back({static_cast<Index>(c), NotFollowed::excluded, arc.at(arc.length() / 2)});
+    all.push_back(
+        {static_cast<Index>(c), NotFollowed::excluded, arc.at(arc.length() / 2), curves[c].points, arc.length()});
   }
   return all;
 }
@@ -295,10 +297,10 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
-  if (!keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed, edges_.features.curves)) return going;
+  if (!keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed)) return going;
   start_.lost.clear();
   for (const UnfollowedCurve& curve : unfollowed)
-    if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.curve);
+    if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.points);
   best_start_ = start_;
   return going;
 }
@@ -442,11 +444,10 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
   const VolumeMesh& grid = best_start_.grid.mesh;
   for (Fault& fault : faults) fault = cells_at(grid, best_start_.fitted, result_.mesh, fault);
   const BoundaryCells cells(grid, best_start_.fitted);
-  const std::vector<FeatureCurve>& curves = edges_.features.curves.curves;
-  std::vector<Index> lost = best_start_.lost;
-  std::ranges::stable_sort(lost, std::greater{}, [&](Index c) { return curves[c].length(); });
+  std::vector<std::vector<Vec3>> lost = best_start_.lost;
+  std::ranges::stable_sort(lost, std::greater{}, [](const std::vector<Vec3>& curve) { return polyline_length(curve); });
   const double spacing = std::sqrt(target_.surface.area() / static_cast<double>(grid.num_cells()));
-  for (const Index c : lost) faults.push_back(cells.near(sampled_polyline(curves[c].points, spacing)));
+  for (const std::vector<Vec3>& curve : lost) faults.push_back(cells.near(sampled_polyline(curve, spacing)));
   const TriangleMesh surface = refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh)));
   faults.push_back(cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
   return faults;

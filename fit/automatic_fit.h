@@ -78,11 +78,11 @@ struct AutomaticFitOptions {
   bool keep_states = false;           ///< fills AutomaticFitResult::states
 };
 
-/// A sharp edge of the target that no edges of the mesh follow.
+/// A sharp edge of the target that no edges of the mesh follow, or not to its ends.
 struct MissedEdge {
   NotFollowed reason;
-  Vec3 place;                 ///< a point of it, in the target's coordinates
-  double length_percent = 0;  ///< percent of the diagonal
+  Vec3 place;                 ///< a point that is not followed, in the target's coordinates
+  double length_percent = 0;  ///< of all of it that is not followed, in percent of the diagonal
 };
 
 /// One template that was fitted, and what came out.

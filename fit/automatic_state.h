@@ -24,7 +24,7 @@ struct TrialStart {
   SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
   std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
   std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
-  std::vector<Index> lost;       ///< curves without a path
+  std::vector<std::vector<Vec3>> lost;  ///< curves without a path, and ends of curves that paths leave out
 };
 
 /// This is what a level needs of an edge layout. The layout belongs to a mesh; if that mesh is a cage, the faces and

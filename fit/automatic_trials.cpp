@@ -127,12 +127,10 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
   return true;
 }
 
-std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
-                                     const Normalisation& normalisation) {
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalisation& normalisation) {
   std::vector<MissedEdge> missed;
   for (const UnfollowedCurve& curve : unfollowed)
-    missed.push_back(
-        {curve.reason, normalisation.from_unit({curve.place})[0], 100 * curves.curves[curve.curve].length()});
+    missed.push_back({curve.reason, normalisation.from_unit({curve.place})[0], 100 * curve.length});
   std::stable_sort(missed.begin(), missed.end(),
                    [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
   return missed;
@@ -148,8 +146,8 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
   if (missed.empty()) return;
   const MissedEdge& longest = missed.front();
   report.warnings.push_back(
-      formatted("%zu of %zu %s are not followed; the longest, %.3g %% of the diagonal, at (%.6g, "
-                "%.6g, %.6g): %s",
+      formatted("%zu of %zu %s are not followed, or not to their ends; most is left out, %.3g %% of the diagonal, at "
+                "(%.6g, %.6g, %.6g): %s",
                 missed.size(), num_curves, name, longest.length_percent, longest.place.x(), longest.place.y(),
                 longest.place.z(), to_string(longest.reason).c_str()));
 }

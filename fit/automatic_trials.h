@@ -64,9 +64,8 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
                AutomaticFitResult& result);
 
 /// Returns the curves that no path follows, longest first, in the target's own coordinates.
-/// curves  in normalized coordinates, as are the places of `unfollowed`.
-std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
-                                     const Normalisation& normalisation);
+/// unfollowed  in normalized coordinates.
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalisation& normalisation);
 
 /// Returns the number of edges longer than `kLongEdgePercent` that cells could follow: all but those that are too
 /// acute.

@@ -261,8 +261,8 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   if (layout_ && !curves_.features.curves.empty())
     edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
   const bool going = trial.self_intersections.has_value();
-  keep_if_best(std::move(trial), quality, edges, layout_ ? layout_->routing.unfollowed : std::vector<UnfollowedCurve>{},
-               curves_.features.curves);
+  keep_if_best(std::move(trial), quality, edges,
+               layout_ ? layout_->routing.unfollowed : std::vector<UnfollowedCurve>{});
   return going;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/corner_placement.h"
 
+#include "subvol/fit/features/corner_clusters.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -21,10 +23,18 @@ constexpr double kFarPenalty = 4;
 }  // namespace
 
 CornerPlacement::CornerPlacement(const RoutingGraph& graph, const SignedFeatures& features,
-                                 std::span<const std::uint8_t> followed)
-    : graph_(graph), h_(graph.edge_length()), taken_(graph.num_vertices(), 0) {
+                                 std::span<const std::uint8_t> followed, std::span<const std::uint8_t> vanishing)
+    : graph_(graph),
+      h_(graph.edge_length()),
+      clusters_(corner_clusters(graph, features, followed, vanishing)),
+      taken_(graph.num_vertices(), 0) {
   find_needs(features, followed);
   place();
+}
+
+Index CornerPlacement::representative(Index corner) const {
+  const auto at = representatives_.find(corner);
+  return at == representatives_.end() ? corner : at->second;
 }
 
 void CornerPlacement::find_needs(const SignedFeatures& features, std::span<const std::uint8_t> followed) {
@@ -33,8 +43,9 @@ void CornerPlacement::find_needs(const SignedFeatures& features, std::span<const
     for (int end = 0; end < 2; ++end) {
       const Index corner = end == 0 ? curves[c].vertices.front() : curves[c].vertices.back();
       if (!followed[c] || !std::ranges::binary_search(features.curves.corners, corner)) continue;
-      Needs& needs = needs_[corner];
-      needs.position = end == 0 ? curves[c].points.front() : curves[c].points.back();
+      Needs& needs = needs_[representative(corner)];
+      if (representative(corner) == corner)
+        needs.position = end == 0 ? curves[c].points.front() : curves[c].points.back();
       ++needs.curves;
       needs.convex += features.is_convex(static_cast<Index>(c));
     }
@@ -70,7 +81,7 @@ double CornerPlacement::cost(const Needs& needs, Index v) const {
 }
 
 Index CornerPlacement::vertex_of(Index corner) const {
-  const auto at = vertex_of_corner_.find(corner);
+  const auto at = vertex_of_corner_.find(representative(corner));
   return at == vertex_of_corner_.end() ? kNoIndex : at->second;
 }
 
@@ -94,6 +105,42 @@ bool CornerPlacement::move(Index corner, const std::function<double(Index)>& ext
   taken_[best] = 1;
   vertex = best;
   return true;
+}
+
+bool CornerPlacement::share(Index corner, Index other) {
+  const auto cluster = clusters_.find(corner), of_other = clusters_.find(other);
+  if (cluster == clusters_.end() || of_other == clusters_.end() || cluster->second != of_other->second) return false;
+  const Index to = representative(other);
+  if (to == corner || vertex_of(to) == kNoIndex) return false;
+  for (auto& [shared, place] : representatives_)
+    if (place == corner) place = to;
+  representatives_[corner] = to;
+  needs_[to].curves += needs_[corner].curves;
+  needs_[to].convex += needs_[corner].convex;
+  needs_.erase(corner);
+  if (const auto at = vertex_of_corner_.find(corner); at != vertex_of_corner_.end()) {
+    taken_[at->second] = 0;
+    vertex_of_corner_.erase(at);
+  }
+  return true;
+}
+
+bool CornerPlacement::share_all(Index corner) {
+  const auto cluster = clusters_.find(corner);
+  if (cluster == clusters_.end()) return false;
+  Index main = kNoIndex;
+  std::vector<Index> others;
+  for (const auto& [member, number] : clusters_) {
+    if (number != cluster->second || representative(member) != member || vertex_of(member) == kNoIndex) continue;
+    if (main != kNoIndex && needs_.at(member).curves <= needs_.at(main).curves) {
+      others.push_back(member);
+      continue;
+    }
+    if (main != kNoIndex) others.push_back(main);
+    main = member;
+  }
+  for (const Index other : others) share(other, main);
+  return !others.empty();
 }
 
 }  // namespace subvol::internal

@@ -16,23 +16,34 @@ namespace subvol::internal {
 inline constexpr double kFollowDistance = 1.1;
 
 /// The vertices of a mesh that represent the corners of a target, one to one: those of the least cost first, as
-/// `route_features` defines it.
+/// `route_features` defines it. Corners of one cluster may be made to share a vertex afterwards.
 class CornerPlacement {
  public:
   /// graph, features  must outlive the object.
   /// followed  one entry per curve, not zero for curves that paths are to follow; corners without such curves get none.
-  CornerPlacement(const RoutingGraph& graph, const SignedFeatures& features, std::span<const std::uint8_t> followed);
+  /// vanishing likewise for curves that are too short for a path: see `corner_clusters`.
+  CornerPlacement(const RoutingGraph& graph, const SignedFeatures& features, std::span<const std::uint8_t> followed,
+                  std::span<const std::uint8_t> vanishing);
 
+  /// Returns the corner whose place this one takes: itself, unless it shares a vertex.
+  Index representative(Index corner) const;
   /// Returns the vertex of a corner, or kNoIndex.
   Index vertex_of(Index corner) const;
-  /// Returns the corner at a vertex, or kNoIndex.
+  /// Returns the corner at a vertex, the representative if several share it, or kNoIndex.
   Index corner_at(Index vertex) const;
   /// One entry per vertex of the graph: 1 if it represents a corner, else 0.
   const std::vector<std::uint8_t>& taken() const { return taken_; }
 
-  /// Moves a corner to the free vertex of the least cost, with extra(vertex) added, from which paths still follow the
-  /// curves of the corner. Returns false if there is none; extra: infinity for vertices that are out of the question.
+  /// Moves a representative corner to the free vertex of the least cost, with extra(vertex) added, from which paths
+  /// still follow the curves of the corner. Returns false if there is none; extra: infinity for vertices that are out
+  /// of the question.
   bool move(Index corner, const std::function<double(Index)>& extra);
+  /// Makes a representative corner share the vertex of another corner of its cluster, and frees its own. Returns false
+  /// if that is not possible.
+  bool share(Index corner, Index other);
+  /// Makes all corners of a corner's cluster share one vertex: that of the corner of the most curves. Returns false if
+  /// there is nothing to do.
+  bool share_all(Index corner);
 
  private:
   struct Needs {
@@ -47,7 +58,9 @@ class CornerPlacement {
 
   const RoutingGraph& graph_;
   double h_;
-  std::map<Index, Needs> needs_;  ///< by corner
+  std::map<Index, Index> clusters_;         ///< `corner_clusters`
+  std::map<Index, Index> representatives_;  ///< of the corners that share a vertex of another one
+  std::map<Index, Needs> needs_;            ///< by representative corner
   std::map<Index, Index> vertex_of_corner_;
   std::vector<std::uint8_t> taken_;
 };

@@ -33,6 +33,11 @@ struct Sum {
   double mean() const { return length > 0 ? total / length : 0; }
 };
 
+template <class Visit>
+void sample_polyline(std::span<const Vec3> points, double spacing, const Visit& visit) {
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) sample_segment(points[i], points[i + 1], spacing, visit);
+}
+
 std::optional<ClosestPoint> crease_tree(std::span<const Vec3> points, std::span<const CreaseSegment> segments) {
   if (segments.empty()) return std::nullopt;
   TriangleMesh mesh;
@@ -57,7 +62,8 @@ void check_segments(std::span<const CreaseSegment> segments, std::size_t num_poi
 }  // namespace
 
 CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3> points,
-                               std::span<const CreaseSegment> segments, double diagonal) {
+                               std::span<const CreaseSegment> segments, double diagonal,
+                               const FeatureCurves* followed) {
   if (!(diagonal > 0)) throw InputError("crease_distance: diagonal must be positive");
   check_segments(segments, points.size(), curves.curves.size());
   const double spacing = diagonal / 1000, percent = 100 / diagonal;
@@ -73,17 +79,18 @@ CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3
   for (std::size_t c = 0; c < curves.curves.size(); ++c) {
     const FeatureCurve& curve = curves.curves[c];
     const std::optional<ClosestPoint> own = crease_tree(points, by_curve[c]);
-    for (std::size_t i = 0; i + 1 < curve.points.size(); ++i)
-      sample_segment(curve.points[i], curve.points[i + 1], spacing, [&](const Vec3& y, double length) {
-        if (own) from_target.add(y, own->closest(y).distance, length);
-        if (any && any->closest(y).distance * percent <= kSharpPercent) within += length;
-      });
+    sample_polyline(curve.points, spacing, [&](const Vec3& y, double length) {
+      if (any && any->closest(y).distance * percent <= kSharpPercent) within += length;
+    });
     ++result.num_curves;
     result.target_length_percent += percent * curve.length();
     if (!own) continue;
+    const FeatureCurve& part = followed ? followed->curves[c] : curve;
     ++result.num_followed;
-    result.followed_length_percent += percent * curve.length();
-    const ClosestPoint tree = polyline_tree(curve.points);
+    result.followed_length_percent += percent * part.length();
+    sample_polyline(part.points, spacing,
+                    [&](const Vec3& y, double length) { from_target.add(y, own->closest(y).distance, length); });
+    const ClosestPoint tree = polyline_tree(part.points);
     for (const CreaseSegment& s : by_curve[c])
       sample_segment(points[s.ends[0]], points[s.ends[1]], spacing,
                      [&](const Vec3& x, double length) { to_target.add(x, tree.closest(x).distance, length); });

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace subvol::internal {
@@ -41,11 +42,6 @@ std::array<double, 3> sheet_factors(bool along_curves) {
 
 }  // namespace
 
-double edge_length_near(const RoutingGraph& graph, const FeatureCurve& curve) {
-  const double h = graph.edge_length();
-  return h * graph.mean_size(sampled_polyline(curve.points, h / 2));
-}
-
 CurveSearch::CurveSearch(const RoutingGraph& graph, const SignedFeatures& features, const CornerPlacement& corners,
                          std::optional<std::span<const std::uint8_t>> along_sheet_curves,
                          std::function<bool()> cancelled)
@@ -57,20 +53,33 @@ CurveSearch::CurveSearch(const RoutingGraph& graph, const SignedFeatures& featur
       cancelled_(std::move(cancelled)),
       courses_(curves_.size()) {
   for (const FeatureCurve& curve : curves_) {
-    h_.push_back(edge_length_near(graph, curve));
+    const RoutingGraph::Sizes lengths = edge_lengths_near(graph, curve);
+    h_.push_back(lengths.mean);
+    largest_h_.push_back(lengths.largest);
     trees_.push_back(polyline_tree(curve.points));
   }
 }
 
-std::optional<CurveSearch::Found> CurveSearch::judged(std::vector<Index> path, Index c, double most) const {
+/// Returns a path with its gap if it follows a curve, or a part of it: the points `curve`.
+std::optional<CurveSearch::Found> CurveSearch::judged(std::vector<Index> path, Index c, std::span<const Vec3> curve,
+                                                      double most) const {
   if (path.size() < 2) return std::nullopt;
   std::vector<Vec3> points;
   for (Index v : path) points.push_back(graph_.position(v));
-  if (polyline_length(points) > kMostStretch * curves_[c].length()) return std::nullopt;
-  const double spacing = h_[c] / 4;
-  const double gap = std::max(farthest(sampled_polyline(points, spacing), trees_[c]),
-                              farthest(sampled_polyline(curves_[c].points, spacing), polyline_tree(points))) /
-                     h_[c];
+  if (polyline_length(points) > kMostStretch * polyline_length(curve)) return std::nullopt;
+  const double spacing = h_[c] / 4, h = graph_.edge_length();
+  std::vector<double> lengths;  // h at each edge of the path
+  double gap = 0;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    lengths.push_back(h * std::max(graph_.size(path[i]), graph_.size(path[i + 1])));
+    const auto samples = sampled_polyline(std::span(points).subspan(i, 2), spacing);
+    gap = std::max(gap, farthest(samples, trees_[c]) / lengths.back());
+  }
+  const ClosestPoint of_path = polyline_tree(points);
+  for (const Vec3& p : sampled_polyline(curve, spacing)) {
+    const ClosestPoint::Hit hit = of_path.closest(p);
+    gap = std::max(gap, hit.distance / lengths[hit.triangle]);
+  }
   if (!(gap <= most)) return std::nullopt;
   return Found{std::move(path), gap};
 }
@@ -78,7 +87,7 @@ std::optional<CurveSearch::Found> CurveSearch::judged(std::vector<Index> path, I
 CurveWalk CurveSearch::walk_along(Index c, std::vector<Vec3> points, double most) const {
   return {std::move(points),
           along_sheet_curves_ ? sheet_factors((*along_sheet_curves_)[c] != 0) : edge_factors(features_.angles[c]),
-          kSoftness * h_[c], most * h_[c]};
+          kSoftness * h_[c], most * largest_h_[c]};
 }
 
 CurveSearch::Course CurveSearch::straight_course(Index c) const {
@@ -198,7 +207,7 @@ std::optional<CurveSearch::Found> CurveSearch::find_on_one_side(Index c, const O
   for (const std::vector<Index>& side :
        path_sides(graph_, sampled_polyline(curves_[c].points, h_[c] / 2), kAnchorReach * h_[c], occupied))
     for (Course& course : courses(c))
-      if (auto found = judged(path_on(course, c, occupied, side), c, kFollowDistance))
+      if (auto found = judged(path_on(course, c, occupied, side), c, curves_[c].points, kFollowDistance))
         if (!best || found->gap < best->gap) best = std::move(found);
   return best;
 }
@@ -206,8 +215,33 @@ std::optional<CurveSearch::Found> CurveSearch::find_on_one_side(Index c, const O
 std::optional<CurveSearch::Found> CurveSearch::find(Index c, const Occupied& occupied) {
   if (!(graph_.edge_length() > 0) || lacks_corner(c) || is_cancelled()) return std::nullopt;
   for (Course& course : courses(c))
-    if (auto found = judged(path_on(course, c, occupied), c, kFollowDistance)) return found;
+    if (auto found = judged(path_on(course, c, occupied), c, curves_[c].points, kFollowDistance)) return found;
   return curves_[c].closed() ? find_on_one_side(c, occupied) : std::nullopt;
+}
+
+std::optional<CurveSearch::FoundPart> CurveSearch::find_part(Index c, const Occupied& occupied) {
+  constexpr std::array kLeftOut = {0.0, 1.0, 2.0, 3.0, 4.5, 6.0};  // at one end, in units of h
+  constexpr double kLeastPart = 0.5, kLeastLength = 3;             // of the curve; in units of h
+  const FeatureCurve& curve = curves_[c];
+  if (curve.closed() || !(h_[c] > 0)) return std::nullopt;
+  const ArcLength arc(curve.points);
+  const double least = std::max(kLeastPart * arc.length(), kLeastLength * h_[c]);
+  std::vector<std::pair<double, double>> parts;  // from, to
+  for (const double front : kLeftOut)
+    for (const double back : kLeftOut)
+      if (arc.length() - (front + back) * h_[c] >= least) parts.push_back({front * h_[c], arc.length() - back * h_[c]});
+  std::ranges::stable_sort(parts, std::greater{}, [](const auto& part) { return part.second - part.first; });
+  for (const auto& [from, to] : parts) {
+    if (is_cancelled()) return std::nullopt;
+    const std::vector<Vec3> points = arc.part(from, to);
+    Course course;
+    course.anchors = {{points.front(), from > 0 ? kNoIndex : corners_.vertex_of(curve.vertices.front())},
+                      {points.back(), to < arc.length() ? kNoIndex : corners_.vertex_of(curve.vertices.back())}};
+    course.legs.push_back(walk_along(c, points));
+    if (auto found = judged(path_on(course, c, occupied), c, points, kFollowDistance))
+      return FoundPart{std::move(found->path), from, to};
+  }
+  return std::nullopt;
 }
 
 CurveSearch::Straying::Straying(const CurveSearch& search, Index c, double most)
@@ -215,7 +249,8 @@ CurveSearch::Straying::Straying(const CurveSearch& search, Index c, double most)
 
 std::optional<CurveSearch::Found> CurveSearch::Straying::find(Index from, Index to, const Occupied& occupied) {
   if (search_.is_cancelled()) return std::nullopt;
-  return search_.judged(walk_.cheapest_path(search_.graph_, from, to, occupied), curve_, most_);
+  return search_.judged(walk_.cheapest_path(search_.graph_, from, to, occupied), curve_, search_.curves_[curve_].points,
+                        most_);
 }
 
 }  // namespace subvol::internal

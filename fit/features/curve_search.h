@@ -15,9 +15,6 @@
 
 namespace subvol::internal {
 
-/// Returns h near a curve: the mean length of the boundary's edges, of size 1, times the mean size there.
-double edge_length_near(const RoutingGraph& graph, const FeatureCurve& curve);
-
 /// Searches for paths of boundary edges that follow the curves of a target, one curve at a time, as `route_features`
 /// defines them.
 class CurveSearch {
@@ -43,6 +40,16 @@ class CurveSearch {
 
   /// Looks for a path of a curve that touches nothing occupied but its corners.
   std::optional<Found> find(Index c, const Occupied& occupied);
+
+  /// A path along a part of an open curve, between two places given by arc length.
+  struct FoundPart {
+    std::vector<Index> path;
+    double from, to;
+  };
+  /// Looks for a path along an open curve that may leave out some of it at its ends, as little as possible: at most 6 h
+  /// at each, and half of the curve. It is at least 3 h long, and ends at any free vertex where it leaves something out
+  /// or where a corner has no vertex.
+  std::optional<FoundPart> find_part(Index c, const Occupied& occupied);
 
   /// Looks for paths of an open curve between two vertices that may stray from it by up to `most`, in units of h.
   class Straying {
@@ -85,7 +92,7 @@ class CurveSearch {
                              std::span<const Index> allowed = {}) const;
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied);
   bool is_cancelled() const { return cancelled_ && cancelled_(); }
-  std::optional<Found> judged(std::vector<Index> path, Index c, double most) const;
+  std::optional<Found> judged(std::vector<Index> path, Index c, std::span<const Vec3> curve, double most) const;
 
   const RoutingGraph& graph_;
   const SignedFeatures& features_;
@@ -93,7 +100,7 @@ class CurveSearch {
   const CornerPlacement& corners_;
   std::optional<std::span<const std::uint8_t>> along_sheet_curves_;
   std::function<bool()> cancelled_;
-  std::vector<double> h_;                     ///< near each curve
+  std::vector<double> h_, largest_h_;         ///< near each curve
   std::vector<ClosestPoint> trees_;           ///< of the curves
   std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
 };

@@ -2,6 +2,7 @@
 #include "subvol/fit/features/feature_routing.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/features/corner_clusters.h"
 #include "subvol/fit/features/corner_placement.h"
 #include "subvol/fit/features/curve_search.h"
 #include "subvol/fit/features/path_negotiation.h"
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -32,9 +34,6 @@ constexpr double kOnWayPenalty = 1;
 /// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
 /// Jacobian at which cells are given up.
 constexpr double kLeastAngle = 19;
-/// Shorter curves are left alone, in units of h: no path is as short, and their corners would take vertices that other
-/// curves need.
-constexpr double kLeastRoutedLength = 0.5;
 
 using Paths = std::vector<std::vector<Index>>;  ///< by curve; empty: none
 
@@ -49,9 +48,12 @@ class Router {
         joinable_(curves_.size(), 1),
         best_(curves_.size()) {
     take(options);
-    std::vector<std::uint8_t> followed;
-    for (std::size_t c = 0; c < curves_.size(); ++c) followed.push_back(is_eligible(static_cast<Index>(c)));
-    corners_.emplace(graph_, features, followed);
+    std::vector<std::uint8_t> followed, vanishing;
+    for (std::size_t c = 0; c < curves_.size(); ++c) {
+      followed.push_back(is_eligible(static_cast<Index>(c)));
+      vanishing.push_back(reasons_[c] == NotFollowed::shorter_than_cell);
+    }
+    corners_.emplace(graph_, features, followed, vanishing);
     search_.emplace(graph_, features, *corners_,
                     options.on_sheets ? std::optional(std::span<const std::uint8_t>(along_curves_)) : std::nullopt,
                     options.cancelled);
@@ -71,7 +73,7 @@ class Router {
       auto found = search_->find(c, base_);
       if (!found) {
         found = search_->find(c, nothing);
-        if (found) has_moved |= move_corners_off(found->path, is_on_way);
+        if (found) has_moved |= move_corners_off(c, found->path, is_on_way);
       }
       if (found)
         for (const Index v : found->path) is_on_way[v] = 1;
@@ -79,9 +81,21 @@ class Router {
     return has_moved;
   }
 
+  /// Lets the corners around the ends of lost curves share vertices. Returns false if none may.
+  bool share_ends(std::span<const UnfollowedCurve> lost) {
+    bool any = false;
+    for (const UnfollowedCurve& curve : lost)
+      for (int end = 0; end < 2; ++end)
+        if (is_eligible(curve.curve) && curve.reason != NotFollowed::shorter_than_cell)
+          any |= corners_->share_all(corner_at(curve.curve, end));
+    if (any) base_.vertices = corners_->taken();
+    return any;
+  }
+
   double followed_length() const { return best_length_; }
 
-  FeatureRouting run() {
+  /// Finds paths of whole curves.
+  void run() {
     std::vector<Index> order = order_by_gap();
     for (int round = 0; round < kRounds && !order.empty(); ++round) {
       const std::vector<std::uint8_t> failed = run_round(order);
@@ -91,7 +105,45 @@ class Router {
     }
     complete();
     negotiate();
-    return result();
+  }
+
+  /// Finds paths along parts of the open curves that are lost, the longest first.
+  void follow_parts() {
+    Occupied occupied = occupied_by_best();
+    std::vector<Index> lost = lost_by_length();
+    std::ranges::reverse(lost);
+    for (const Index c : lost) {
+      if (!joinable_[c]) continue;
+      auto found = search_->find_part(c, occupied);
+      if (!found) continue;
+      lost_.push_back(explained(c));
+      occupied.add(graph_, found->path);
+      best_[c] = std::move(found->path);
+      parts_.push_back({c, found->from, found->to});
+    }
+    std::ranges::sort(parts_, {}, &FollowedPart::curve);
+  }
+
+  FeatureRouting result() const {
+    FeatureRouting routing;
+    routing.parts = parts_;
+    for (std::size_t i = 0; i < curves_.size(); ++i) {
+      const auto c = static_cast<Index>(i);
+      if (best_[c].empty()) {
+        routing.unfollowed.push_back(explained(c));
+        continue;
+      }
+      routing.paths.push_back({c, best_[c]});
+      const bool front = note_corner(c, 0, routing.corners), back = note_corner(c, 1, routing.corners);
+      if (const auto part = std::ranges::lower_bound(parts_, c, {}, &FollowedPart::curve);
+          part != parts_.end() && part->curve == c)
+        routing.unfollowed.push_back(left_out(*part));
+      else if (!front || !back)
+        routing.joined.push_back(c);
+    }
+    std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
+    routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
+    return routing;
   }
 
  private:
@@ -113,7 +165,7 @@ class Router {
         reasons_[c] = NotFollowed::excluded;
       else if (features_.angles[c] < kLeastAngle)
         reasons_[c] = NotFollowed::too_acute;
-      else if (curves_[c].length() < kLeastRoutedLength * edge_length_near(graph_, curves_[c]))
+      else if (curves_[c].length() < kLeastRoutedLength * edge_lengths_near(graph_, curves_[c]).mean)
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }
@@ -141,9 +193,10 @@ class Router {
     return curves;
   }
 
-  /// Moves the corners at inner vertices of a path to other vertices near them, if there are some: rather to those that
-  /// are not on the ways of other curves. Returns false if all stay.
-  bool move_corners_off(std::span<const Index> path, std::span<const std::uint8_t> is_on_way) {
+  /// Moves the corners at inner vertices of a curve's path to other vertices near them, if there are some: rather to
+  /// those that are not on the ways of other curves. Others share the vertex of the curve's end if they may. Returns
+  /// false if all stay.
+  bool move_corners_off(Index c, std::span<const Index> path, std::span<const std::uint8_t> is_on_way) {
     bool has_moved = false;
     for (const Index v : path.subspan(1, path.size() - 2)) {
       const Index corner = corners_->corner_at(v);
@@ -151,11 +204,13 @@ class Router {
       const bool moves = corners_->move(corner, [&](Index w) {
         return std::ranges::find(path, w) != path.end() ? kInfinity : is_on_way[w] ? kOnWayPenalty : 0;
       });
-      if (!moves) continue;
+      if (!moves && !corners_->share(corner, corner_at(c, 0)) && !corners_->share(corner, corner_at(c, 1))) continue;
       has_moved = true;
-      for (std::size_t c = 0; c < curves_.size(); ++c)
-        if (corner_at(static_cast<Index>(c), 0) == corner || corner_at(static_cast<Index>(c), 1) == corner)
-          search_->forget(static_cast<Index>(c));
+      const Index place = corners_->representative(corner);
+      for (std::size_t i = 0; i < curves_.size(); ++i)
+        for (int end = 0; end < 2; ++end)
+          if (corners_->representative(corner_at(static_cast<Index>(i), end)) == place)
+            search_->forget(static_cast<Index>(i));
     }
     if (has_moved) base_.vertices = corners_->taken();
     return has_moved;
@@ -312,16 +367,19 @@ class Router {
     const ArcLength arc(curve.points);
     const Vec3 middle = arc.at(arc.length() / 2);
     const double h = search_->edge_length(c);
-    if (!is_eligible(c)) return {c, *reasons_[c], middle};
+    const auto because = [&](NotFollowed reason, const Vec3& place) {
+      return UnfollowedCurve{c, reason, place, curve.points, arc.length()};
+    };
+    if (!is_eligible(c)) return because(*reasons_[c], middle);
     for (int end = 0; end < 2 && search_->lacks_corner(c) && curve.length() >= h; ++end)
       if (vertex_of(corner_at(c, end)) == kNoIndex)
-        return {c, NotFollowed::no_vertex_at_corner, end == 0 ? curve.points.front() : curve.points.back()};
-    if (curve.length() < h) return {c, NotFollowed::shorter_than_cell, middle};
-    if (!std::ranges::binary_search(alone_, c)) return {c, NotFollowed::no_path_nearby, middle};
+        return because(NotFollowed::no_vertex_at_corner, end == 0 ? curve.points.front() : curve.points.back());
+    if (curve.length() < h) return because(NotFollowed::shorter_than_cell, middle);
+    if (!std::ranges::binary_search(alone_, c)) return because(NotFollowed::no_path_nearby, middle);
     for (int end = 0; end < 2; ++end)
       if (is_crowded(corner_at(c, end)))
-        return {c, NotFollowed::too_many_edges_at_corner, end == 0 ? curve.points.front() : curve.points.back()};
-    return {c, NotFollowed::lost_to_neighbor, middle};
+        return because(NotFollowed::too_many_edges_at_corner, end == 0 ? curve.points.front() : curve.points.back());
+    return because(NotFollowed::lost_to_neighbor, middle);
   }
 
   bool is_crowded(Index corner) const {
@@ -338,21 +396,15 @@ class Router {
     return curves_[c].closed() || vertex_of(corner) == v;
   }
 
-  FeatureRouting result() const {
-    FeatureRouting routing;
-    for (std::size_t i = 0; i < curves_.size(); ++i) {
-      const auto c = static_cast<Index>(i);
-      if (best_[c].empty()) {
-        routing.unfollowed.push_back(explained(c));
-        continue;
-      }
-      routing.paths.push_back({c, best_[c]});
-      const bool front = note_corner(c, 0, routing.corners), back = note_corner(c, 1, routing.corners);
-      if (!front || !back) routing.joined.push_back(c);
-    }
-    std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
-    routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
-    return routing;
+  /// Returns what the path of a part leaves out.
+  UnfollowedCurve left_out(const FollowedPart& part) const {
+    UnfollowedCurve lost = *std::ranges::find(lost_, part.curve, &UnfollowedCurve::curve);
+    const ArcLength arc(curves_[part.curve].points);
+    const bool is_front = part.from > arc.length() - part.to;
+    lost.points = is_front ? arc.part(0, part.from) : arc.part(part.to, arc.length());
+    lost.length = arc.length() - (part.to - part.from);
+    lost.place = arc.at(is_front ? part.from / 2 : (part.to + arc.length()) / 2);
+    return lost;
   }
 
   const SignedFeatures& features_;
@@ -368,24 +420,36 @@ class Router {
   Paths best_;
   double best_length_ = 0;
   std::vector<Index> alone_;  ///< curves that have a path if no other one has
+  std::vector<FollowedPart> parts_;
+  std::vector<UnfollowedCurve> lost_;  ///< the curves of parts_, as they were before
 };
 
 }  // namespace
 
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options) {
-  Router router(mesh, features, options);
-  FeatureRouting routing = router.run();
-  if (routing.unfollowed.empty()) return routing;
-  Router cleared(mesh, features, options);
-  if (!cleared.clear_ways()) return routing;
-  FeatureRouting other = cleared.run();
-  return cleared.followed_length() > router.followed_length() ? other : routing;
+  auto best = std::make_unique<Router>(mesh, features, options);
+  best->run();
+  const std::vector<UnfollowedCurve> lost = best->result().unfollowed;
+  if (lost.empty()) return best->result();
+  const auto keep_if_longer = [&](std::unique_ptr<Router> other) {
+    other->run();
+    if (other->followed_length() > best->followed_length()) best = std::move(other);
+  };
+  if (auto cleared = std::make_unique<Router>(mesh, features, options); cleared->clear_ways())
+    keep_if_longer(std::move(cleared));
+  if (auto shared = std::make_unique<Router>(mesh, features, options); shared->share_ends(lost)) {
+    shared->clear_ways();
+    keep_if_longer(std::move(shared));
+  }
+  if (!options.on_sheets) best->follow_parts();
+  return best->result();
 }
 
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
   double all = 0, routed = 0;
   for (const FeatureCurve& curve : curves.curves) all += curve.length();
   for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
+  for (const FollowedPart& part : routing.parts) routed -= curves.curves[part.curve].length() - (part.to - part.from);
   return all > 0 ? routed / all : 1;
 }
 

@@ -14,12 +14,19 @@
 
 namespace subvol::internal {
 
-/// A curve that no path follows, with a point of the target for a report: the corner that is at fault, or the middle of
-/// the curve.
+/// A curve that no path follows, or that is followed in part.
 struct UnfollowedCurve {
   Index curve;
   NotFollowed reason;
-  Vec3 place;
+  Vec3 place;                ///< for a report: the corner that is at fault, or the middle of `points`
+  std::vector<Vec3> points;  ///< the curve, or the longer of the ends that its path leaves out
+  double length;             ///< of the curve, or of all that is left out
+};
+
+/// The part of an open curve that a path follows, between two places given by arc length.
+struct FollowedPart {
+  Index curve;
+  double from, to;
 };
 
 /// A corner of the target, and the boundary vertex that represents it.
@@ -31,7 +38,8 @@ struct PlacedCorner {
 
 struct RoutingOptions {
   std::vector<std::uint8_t> excluded;    ///< one entry per curve, not zero for curves to leave alone; empty: none
-  std::vector<std::uint8_t> not_joined;  ///< likewise for curves that may not join the path of another one
+  /// Likewise for curves whose path must lead from corner to corner: it may neither join another one nor be a part.
+  std::vector<std::uint8_t> not_joined;
   /// True: paths run along all sheets of the mesh, its boundary and the interfaces between regions. Numbers of cells do
   /// not matter then.
   bool on_sheets = false;
@@ -48,7 +56,8 @@ struct FeatureRouting {
   std::vector<CreasePath> paths;            ///< at most one per curve, ascending by curve
   std::vector<PlacedCorner> corners;        ///< those at which a path ends, ascending by vertex
   std::vector<Index> joined;                ///< curves whose path ends inside the path of another one; ascending
-  std::vector<UnfollowedCurve> unfollowed;  ///< ascending by curve
+  std::vector<FollowedPart> parts;          ///< of the curves that are followed in part; ascending by curve
+  std::vector<UnfollowedCurve> unfollowed;  ///< those followed in part are among them; ascending by curve
 };
 
 /// Finds a path of boundary edges for as many curves of a target as possible; convex curves prefer edges of one cell,
@@ -61,23 +70,29 @@ struct FeatureRouting {
 ///                    + 4 if distance > 1.1 h,                                              distance < 1.6 h
 ///
 /// h is the mean length of the boundary's edges, of edges of size 1 if sizes are given; it is multiplied by the size at
-/// a vertex, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle below 19
-/// degrees, are left alone, and so are corners without other curves. The path between two of them minimizes
+/// a vertex or an edge, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle
+/// below 19 degrees, are left alone, and so are corners without other curves. The path between two of them minimizes
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
 ///       3, 1, 1.5 if it is within 20 degrees of 180; else 1.5, and 1 at edges of 3 cells
 ///
-/// where d is the distance to the part of the curve that the path has come to (`CurveWalk`): it takes no short cut where
-/// the curve comes close to itself. Closed curves pass through the vertices nearest to three of their points; if there
-/// is no such path, through vertices on one side of the paths that are there, for each side: both edges of a chamfer
-/// narrower than a cell find one so. A path is accepted if it and the curve stay within 1.1 h of one another. No two
-/// paths share an edge, or a vertex but corners and joins. Up to eight rounds start with the curves that failed in the
-/// round before; the round that follows the greatest length counts. An open curve that is still lost may then stray up
-/// to 2.2 h, and start up to three edges along the path of another curve of the same corner, in its first half ("join").
-/// If curves are lost that have a path alone, all negotiate (`negotiated_paths`), and the greater length counts. If some
-/// are lost then, all is done again with corners moved out of the way: vertices of corners on the path of another curve
-/// that finds no other, the longest curves first; the greater length counts.
+/// where d is the distance to the part of the curve that the path has come to (`CurveWalk`): it takes no short cut
+/// where the curve comes close to itself. Closed curves pass through the vertices nearest to three of their points; if
+/// there is no such path, through vertices on one side of the paths that are there, for each side: both edges of a
+/// chamfer narrower than a cell find one so. A path is accepted if it and the curve stay within 1.1 h of one another.
+/// No two paths share an edge, or a vertex but corners and joins. Up to eight rounds start with the curves that failed
+/// in the round before; the round that follows the greatest length counts. An open curve that is still lost may then
+/// stray up to 2.2 h, and start up to three edges along the path of another curve of the same corner, in its first half
+/// ("join"). If curves are lost that have a path alone, all negotiate (`negotiated_paths`), and the greater length
+/// counts.
+///
+/// If some are lost then, all is done again with corners moved out of the way: vertices of corners on the path of
+/// another curve that finds no other, the longest curves first; a corner that cannot move shares the vertex of the
+/// curve's end if both belong to one cluster (`corner_clusters`). It is done once more with a shared vertex for each
+/// cluster at the ends of lost curves. The greatest length counts. Open curves that are still lost are followed in
+/// part: the path may leave out up to 6 h at each end and half of the curve, and it must be 3 h long. With `on_sheets`,
+/// there are no such parts.
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.

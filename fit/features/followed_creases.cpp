@@ -159,8 +159,8 @@ CreaseEnergy FollowedCreases::energy(std::span<const std::array<Index, 2>> edges
 }
 
 CreaseDistance FollowedCreases::distance(std::span<const std::array<Index, 2>> edges, std::span<const Vec3> points,
-                                         double diagonal) const {
-  return crease_distance(curves_, points, segments(edges), diagonal);
+                                         double diagonal, const FeatureCurves* whole) const {
+  return crease_distance(whole ? *whole : curves_, points, segments(edges), diagonal, &curves_);
 }
 
 }  // namespace subvol::internal

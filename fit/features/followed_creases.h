@@ -66,8 +66,9 @@ class FollowedCreases {
   CreaseEnergy energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
                       double tangential_weight) const;
   /// Measures the distances of the creases. `edges` between points run along them as for `energy`.
-  CreaseDistance distance(std::span<const std::array<Index, 2>> edges, std::span<const Vec3> points,
-                          double diagonal) const;
+  /// whole  the curves that `curves` are parts of; null: themselves.
+  CreaseDistance distance(std::span<const std::array<Index, 2>> edges, std::span<const Vec3> points, double diagonal,
+                          const FeatureCurves* whole = nullptr) const;
 
  private:
   void tag(VolumeMesh& template_mesh) const;

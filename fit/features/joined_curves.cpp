@@ -52,6 +52,17 @@ void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Jun
 
 FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing) {
   FeatureCurves result = features.curves;
+  // Only the ends' numbers of vertices still matter: they tell open curves from closed ones.
+  const auto number_vertices = [](FeatureCurve& curve) {
+    const Index last = curve.vertices.back();
+    curve.vertices.resize(curve.points.size(), last);
+    curve.vertices.back() = last;
+  };
+  for (const FollowedPart& part : routing.parts) {
+    FeatureCurve& curve = result.curves[part.curve];
+    curve.points = ArcLength(features.curves.curves[part.curve].points).part(part.from, part.to);
+    number_vertices(curve);
+  }
   for (Index c : routing.joined) {
     const auto path = std::ranges::lower_bound(routing.paths, c, {}, &CreasePath::curve);
     FeatureCurve& curve = result.curves[c];
@@ -65,10 +76,7 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
       start_at_junction(curve, features.curves.curves[junction->curve], *junction);
       if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
     }
-    // Only the ends' numbers still matter: they tell open curves from closed ones.
-    const Index last = curve.vertices.back();
-    curve.vertices.resize(curve.points.size(), last);
-    curve.vertices.back() = last;
+    number_vertices(curve);
   }
   return result;
 }

@@ -66,7 +66,8 @@ std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatu
   std::vector<VertexCap> caps;
   for (const PlacedCorner& corner : patched.corners) {
     const auto at = directions.find(corner.vertex);
-    if (at == directions.end() || at->second.size() < 3) continue;
+    const bool is_repeated = !caps.empty() && caps.back().vertex == corner.vertex;
+    if (is_repeated || at == directions.end() || at->second.size() < 3) continue;
     const auto& t = at->second;
     const double best = std::abs(t[0].dot(t[1].cross(t[2])));
     caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachable * best : kCornerCap});

@@ -59,11 +59,15 @@ Index RoutingGraph::edge_between(Index v, Index w) const {
   return kNoIndex;
 }
 
-double RoutingGraph::mean_size(std::span<const Vec3> points) const {
-  if (sizes_.empty()) return 1;
-  double sum = 0;
-  for (const Vec3& p : points) sum += size(nearest_vertex(p));
-  return sum / static_cast<double>(points.size());
+RoutingGraph::Sizes RoutingGraph::sizes_at(std::span<const Vec3> points) const {
+  if (sizes_.empty()) return {1, 1};
+  double sum = 0, largest = 0;
+  for (const Vec3& p : points) {
+    const double here = size(nearest_vertex(p));
+    sum += here;
+    largest = std::max(largest, here);
+  }
+  return {sum / static_cast<double>(points.size()), largest};
 }
 
 std::vector<Index> RoutingGraph::vertices_near(const Vec3& point, double distance) const {
@@ -82,6 +86,12 @@ void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
     vertices[path[i]] = 1;
     if (i > 0) edges[graph.edge_between(path[i - 1], path[i])] = 1;
   }
+}
+
+RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve) {
+  const double h = graph.edge_length();
+  const RoutingGraph::Sizes sizes = graph.sizes_at(sampled_polyline(curve.points, h / 2));
+  return {h * sizes.mean, h * sizes.largest};
 }
 
 }  // namespace subvol::internal

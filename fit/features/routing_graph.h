@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/volume_mesh.h"
 
@@ -39,8 +40,11 @@ class RoutingGraph {
   /// h: mean length of the edges, each divided by the mean size of its ends; 0 without edges.
   double edge_length() const { return edge_length_; }
   double size(Index vertex) const { return sizes_.empty() ? 1 : sizes_[vertex]; }
-  /// Returns the mean size of the vertices that are nearest to some points; at least one point.
-  double mean_size(std::span<const Vec3> points) const;
+  /// Returns the mean and the largest size of the vertices that are nearest to some points; at least one point.
+  struct Sizes {
+    double mean, largest;
+  };
+  Sizes sizes_at(std::span<const Vec3> points) const;
 
   /// Returns the boundary vertices within a distance of a point, ascending.
   std::vector<Index> vertices_near(const Vec3& point, double distance) const;
@@ -56,6 +60,10 @@ class RoutingGraph {
   std::vector<double> sizes_;
   SiteTree tree_;
 };
+
+/// Returns h near a curve: the mean length of the boundary's edges, of size 1, times the mean and the largest size
+/// there.
+RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve);
 
 /// The vertices and edges that paths may not touch, and what those cost that they may.
 struct Occupied {

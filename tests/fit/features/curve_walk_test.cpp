@@ -84,7 +84,8 @@ TEST_CASE("paths that want the same row come to terms") {
   }
   const RoutingGraph graph(mesh);
   const std::vector<std::uint8_t> followed(3, 1);
-  const CornerPlacement corners(graph, features, followed);
+  const std::vector<std::uint8_t> vanishing(3, 0);
+  const CornerPlacement corners(graph, features, followed, vanishing);
   CurveSearch search(graph, features, corners, std::nullopt);
   Occupied base = nothing(graph);
   base.vertices = corners.taken();

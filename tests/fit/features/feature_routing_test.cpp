@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/corner_clusters.h"
+#include "subvol/fit/features/corner_placement.h"
 #include "subvol/fit/features/joined_curves.h"
 #include "subvol/fit/features/not_followed.h"
+#include "subvol/fit/features/polyline.h"
+#include "subvol/fit/features/routing_graph.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "tests/support/feature_fixtures.h"
 
@@ -11,6 +15,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <set>
@@ -188,6 +193,74 @@ TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its nei
   CHECK(apart.joined.empty());
   REQUIRE(apart.unfollowed.size() == 1);
   CHECK(apart.unfollowed[0].curve == routing.joined[0]);
+}
+
+TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
+  // The cube ends two edges of the lattice beyond it: no vertex is near its corners there.
+  constexpr double kEnd = 2;
+  TriangleMesh target = cube_surface(2, false);
+  for (Vec3& p : target.positions)
+    if (p.x() > 0.9) p.x() = kEnd;
+  const VolumeMesh mesh = centred_lattice(4);
+  const SignedFeatures features = features_of(target);
+  const FeatureRouting routing = route_features(mesh, features);
+  REQUIRE(routing.parts.size() == 4);
+  CHECK(routing.paths.size() == 8);
+  CHECK(routing.unfollowed.size() == 8);
+  CHECK(routing.joined.empty());
+  require_apart(routing);
+  const FeatureCurves followed = followed_parts(mesh, features, routing);
+  for (const FollowedPart& part : routing.parts) {
+    const FeatureCurve &whole = features.curves.curves[part.curve], &curve = followed.curves[part.curve];
+    CHECK(part.to - part.from < whole.length());
+    CHECK(curve.length() == Approx(part.to - part.from));
+    CHECK(curve.vertices.size() == curve.points.size());
+    const auto lost = std::ranges::find(routing.unfollowed, part.curve, &UnfollowedCurve::curve);
+    REQUIRE(lost != routing.unfollowed.end());
+    CHECK(lost->length == Approx(whole.length() - (part.to - part.from)));
+    CHECK(lost->place.x() > 1);
+    CHECK(polyline_length(lost->points) == Approx(lost->length));
+  }
+  double whole = 0, all = 0;
+  for (const FeatureCurve& curve : features.curves.curves) all += curve.length();
+  for (const CreasePath& path : routing.paths) whole += features.curves.curves[path.curve].length();
+  CHECK(routed_share(routing, features.curves) < whole / all);
+  RoutingOptions options;
+  options.not_joined.assign(12, 1);
+  CHECK(route_features(mesh, features, options).parts.empty());
+}
+
+TEST_CASE("corners of a step that is smaller than an edge may share a vertex") {
+  const TriangleMesh target = block_with_step(0.1);
+  const SignedFeatures features = features_of(target);
+  const VolumeMesh mesh = centred_lattice(4);
+  const RoutingGraph graph(mesh);
+  std::vector<std::uint8_t> followed, vanishing;
+  for (const FeatureCurve& curve : features.curves.curves) {
+    vanishing.push_back(curve.length() < kLeastRoutedLength * graph.edge_length());
+    followed.push_back(!vanishing.back());
+  }
+  const std::size_t num_short = static_cast<std::size_t>(std::ranges::count(vanishing, 1));
+  REQUIRE(num_short > 0);
+  const std::map<Index, Index> clusters = corner_clusters(graph, features, followed, vanishing);
+  CHECK(clusters.size() == 2 * num_short);
+  CornerPlacement corners(graph, features, followed, vanishing);
+  const std::vector<std::uint8_t> before = corners.taken();
+  for (std::size_t c = 0; c < vanishing.size(); ++c) {
+    if (!vanishing[c]) continue;
+    const Index a = features.curves.curves[c].vertices.front(), b = features.curves.curves[c].vertices.back();
+    CHECK(clusters.at(a) == clusters.at(b));
+    const bool have_two = corners.vertex_of(a) != kNoIndex && corners.vertex_of(b) != kNoIndex;
+    CHECK(corners.share_all(a) == have_two);
+    CHECK(corners.vertex_of(a) == corners.vertex_of(b));
+    CHECK_FALSE(corners.share_all(b));
+  }
+  CHECK(std::ranges::count(corners.taken(), 1) < std::ranges::count(before, 1));
+  CHECK_FALSE(corners.share_all(kNoIndex));
+
+  // A corner stays alone if a curve would begin and end at one vertex.
+  const std::vector<std::uint8_t> all(vanishing.size(), 1);
+  CHECK(corner_clusters(graph, features, all, vanishing).empty());
 }
 
 TEST_CASE("routing that is cancelled finds no more paths") {
