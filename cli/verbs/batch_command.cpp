@@ -302,10 +302,10 @@ void add_planning_options(CLI::App& verb, BatchArguments& arguments) {
 
 void add_process_options(CLI::App& verb, BatchOptions& options) {
   verb.add_option("--jobs", options.jobs, "Processes at a time (default: cores / threads)")
-      ->check(CLI::Range(1, 4096))
+      ->check(whole_number_in(1, 4096))
       ->type_name("N");
   verb.add_option("--threads", options.threads, "Threads of each process")
-      ->check(CLI::Range(1, 1024))
+      ->check(whole_number_in(1, 1024))
       ->type_name("N")
       ->capture_default_str();
   verb.add_option("--time-limit", options.time_limit_seconds, "End a model after this time: its class is time_limit")

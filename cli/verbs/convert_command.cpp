@@ -115,7 +115,7 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->type_name("NAME");
   verb->add_option("--intervals", arguments->writing.linear_intervals,
                    "Of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order")
-      ->check(CLI::Range(0, 64))
+      ->check(whole_number_in(0, 64))
       ->type_name("N")
       ->capture_default_str();
   add_map_tolerance(*verb, arguments->writing);

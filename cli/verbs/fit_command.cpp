@@ -254,7 +254,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_option("--levels", fit.levels,
                   "Times the template is subdivided. Without --template, the result is then a cage and its mesh\n"
                   "(1 if only an output asks for a cage)")
-      ->check(CLI::Range(1, 6))
+      ->check(whole_number_in(1, 6))
       ->type_name("L")
       ->capture_default_str();
   verb.add_option(
@@ -300,7 +300,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   const auto group = "Curved elements";
   CLI::Option* order = verb.add_option("--order", arguments.order,
                                        "Fit curved elements, orders raised up to P, in place of a subdivision volume")
-                           ->check(CLI::Range(1, kMaxOrder))
+                           ->check(whole_number_in(1, kMaxOrder))
                            ->type_name("P")
                            ->group(group);
   verb.add_option("--basis", arguments.basis, "Modes of the curved elements")
@@ -451,7 +451,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->group(group);
   verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
-      ->check(CLI::Range(1, 1'000'000))
+      ->check(whole_number_in(1, 1'000'000))
       ->type_name("N")
       ->group(group);
   verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
@@ -478,7 +478,7 @@ void add_fit_command(CLI::App& app, Action& action) {
   verb->add_option("--cells", arguments->cells,
                    "How many cells the result has at most; about so many with --order or options of the method\n"
                    "(default: as many as it needs)")
-      ->check(CLI::Range(kLeastTemplateCells, kMostCells))
+      ->check(whole_number_in(kLeastTemplateCells, kMostCells))
       ->type_name("N")
       ->excludes(file);
   verb->add_option("--size", arguments->size,

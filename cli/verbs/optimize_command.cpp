@@ -59,7 +59,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->capture_default_str();
   verb.add_option("--max-iterations", optimize.max_iterations,
                   "Steps per stage (default: as many as the schedule asks for)")
-      ->check(CLI::Range(1, 1'000'000))
+      ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
   verb.add_option("--time-limit", optimize.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
@@ -67,7 +67,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
   const auto group = "Curved elements";
   CLI::Option* order =
       verb.add_option("--order", arguments.order, "Curve the cells to this order so that they follow --target")
-          ->check(CLI::Range(2, kMaxOrder))
+          ->check(whole_number_in(2, kMaxOrder))
           ->type_name("P")
           ->needs(target)
           ->group(group);

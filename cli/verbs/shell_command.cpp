@@ -322,7 +322,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Thickness of each vertex instead: a vertex property of SURFACE, a .ply")
       ->type_name("NAME");
   verb.add_option("--layers", shell.layers, "Layers on each side")
-      ->check(CLI::Range(1, 1000))
+      ->check(whole_number_in(1, 1000))
       ->type_name("N")
       ->capture_default_str();
   verb.add_option("--growth", shell.growth, "Thickness of a layer against that of the one nearer the surface")
@@ -360,7 +360,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->type_name("DEGREES");
   CLI::Option* order = verb.add_option("--order", arguments.order,
                                        "Order of the cells; above 1 they are curved, but for the surface itself")
-                           ->check(CLI::Range(1, kMaxOrder))
+                           ->check(whole_number_in(1, kMaxOrder))
                            ->type_name("P")
                            ->capture_default_str();
   verb.add_option("--basis", arguments.basis, "Modes of curved cells")
@@ -370,7 +370,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->needs(order);
   add_map_tolerance(verb, arguments.writing)->needs(order);
   verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
-      ->check(CLI::Range(1, 1'000'000))
+      ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
   verb.add_option("--time-limit", shell.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))

@@ -105,7 +105,7 @@ void add_subdivide_command(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<SubdivideArguments>();
   verb->add_option("MESH", arguments->mesh, "Control mesh: " + volume_mesh_formats())->required()->type_name("FILE");
   verb->add_option("--levels", arguments->levels, "Times it is subdivided")
-      ->check(CLI::Range(1, 8))
+      ->check(whole_number_in(1, 8))
       ->type_name("L")
       ->capture_default_str();
   verb->add_option("--boundary", arguments->boundary,

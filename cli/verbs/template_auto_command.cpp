@@ -148,7 +148,7 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->required()
       ->type_name("FILE");
   verb->add_option("--cells", arguments->options.cells, "About how many cells; more where the topology needs them")
-      ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
+      ->check(whole_number_in(kLeastTemplateCells, kMostTemplateCells))
       ->type_name("N")
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");

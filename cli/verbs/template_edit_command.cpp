@@ -216,12 +216,15 @@ CLI::Option* add_box(CLI::App& verb, EditArguments& arguments, const char* help)
 CLI::Option* add_cell_list(CLI::App& verb, EditArguments& arguments, const char* help) {
   return verb.add_option("--list", arguments.cells, help)
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
+      ->check(whole_number_in(0, kMostIndex))
       ->type_name("CELL,...");
 }
 
 CLI::Option* add_vertices(CLI::App& verb, EditArguments& arguments, const char* name, const char* help) {
-  return verb.add_option(name, arguments.vertices, help)->expected(2)->check(CLI::NonNegativeNumber)->type_name("A B");
+  return verb.add_option(name, arguments.vertices, help)
+      ->expected(2)
+      ->check(whole_number_in(0, kMostIndex))
+      ->type_name("A B");
 }
 
 void add_grid(CLI::App& group, Action& action) {
@@ -231,7 +234,7 @@ void add_grid(CLI::App& group, Action& action) {
   add_box(*verb, *a, "Or take this box");
   verb->add_option("--counts", a->counts, "Cells along each axis")
       ->expected(3)
-      ->check(CLI::Range(1, 100'000))
+      ->check(whole_number_in(1, 100'000))
       ->type_name("NX NY NZ");
   verb->add_option("--size", a->size, "Or: about how long a cell is")
       ->check(number_in(1e-300, 1e300))
@@ -279,7 +282,7 @@ void add_extrude(CLI::App& group, Action& action) {
       ->check(number_in(1e-300, 1e300))
       ->type_name("LENGTH");
   verb->add_option("--layers", a->layers, "How many")
-      ->check(CLI::Range(1, 10'000))
+      ->check(whole_number_in(1, 10'000))
       ->type_name("N")
       ->capture_default_str();
   verb->add_option("--growth", a->growth, "Thickness of a layer against the one below")
@@ -333,7 +336,7 @@ void add_split(CLI::App& group, Action& action) {
       ->check(CLI::IsMember({"parts", "prisms", "tets"}))->type_name("parts|prisms|tets")->capture_default_str();
   add_vertices(*verb, *a, "--edge", "Ends of the edge, numbered from 0");
   verb->add_option("--parts", a->parts, "Into how many layers")
-      ->check(CLI::Range(2, 1000))
+      ->check(whole_number_in(2, 1000))
       ->type_name("N")
       ->capture_default_str();
 }

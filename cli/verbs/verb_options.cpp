@@ -6,6 +6,7 @@
 #include "subvol/fit/target/surface_wrap.h"
 
 #include <algorithm>
+#include <charconv>
 #include <sstream>
 #include <utility>
 
@@ -52,13 +53,13 @@ void add_choice(CLI::App& verb, const char* name, Value& value, const std::pair<
 void add_memory_limit(CLI::App& verb, std::size_t& bytes, const std::string& help) {
   verb.add_option("--memory-limit", bytes, help)
       ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
+      ->check(whole_number_in(kLeastMemoryLimit, kMostMemoryLimit))
       ->type_name("SIZE");
 }
 
 void add_resource_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--threads", options.threads, "Number of threads (default: all cores)")
-      ->check(CLI::Range(1, 1024))
+      ->check(whole_number_in(1, 1024))
       ->type_name("N");
   add_memory_limit(verb, options.memory_limit,
                    "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
@@ -97,7 +98,7 @@ void add_wrap_option(CLI::App& verb, std::optional<double>& percent) {
           "Fill a closed surface that follows this one, made of voxels this large, in percent of the diagonal\n"
           "(default: 0.5 if the surface bounds no solid, although parts are united and holes covered). What is\n"
           "thinner or narrower than two voxels may be lost or closed, and sharp edges are cut off by up to one")
-      ->check(CLI::Range(kLeastWrapPercent, kMostWrapPercent))
+      ->check(number_in(kLeastWrapPercent, kMostWrapPercent))
       ->type_name("PERCENT")
       ->excludes(verb.get_option("--regions"));  // the wrap has one region
 }
@@ -212,6 +213,18 @@ CLI::Validator number_in(double low, double high) {
   const auto check = [low, high, text = range.str()](const std::string& word) -> std::string {
     if (is_number_in(word, low, high)) return {};
     return "must be a number in " + text + ", not " + word;
+  };
+  return CLI::Validator(check, "");
+}
+
+CLI::Validator whole_number_in(std::int64_t low, std::int64_t high) {
+  const auto check = [low, high](const std::string& word) -> std::string {
+    std::int64_t value = 0;
+    const char* end = word.data() + word.size();
+    const auto [rest, error] = std::from_chars(word.data(), end, value);
+    if (error == std::errc{} && rest == end && std::to_string(value) == word && value >= low && value <= high)
+      return {};
+    return "must be a whole number in " + std::to_string(low) + " .. " + std::to_string(high) + ", not " + word;
   };
   return CLI::Validator(check, "");
 }

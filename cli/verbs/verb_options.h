@@ -4,10 +4,13 @@
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
+#include "subvol/base/types.h"
 #include "subvol/surface/region_surface.h"
 
 #include <CLI/CLI.hpp>
 
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -50,6 +53,11 @@ CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);
 void require_fitting_options(const CLI::App& verb, bool points);
 /// Accepts numbers from low to high, and nothing else (CLI::Range accepts NaN).
 CLI::Validator number_in(double low, double high);
+/// Accepts whole numbers from low to high in decimal digits, and nothing else: no leading zeros, which CLI11 reads as
+/// octal numbers.
+CLI::Validator whole_number_in(std::int64_t low, std::int64_t high);
+/// The largest number of a cell or vertex.
+inline constexpr std::int64_t kMostIndex = std::numeric_limits<Index>::max();
 /// The options of a verb that have a value, given or default, by long name; a list for several values.
 Json options_in_force(const CLI::App& verb);
 /// Returns those options that affect the result, without those on how a run is reported, limited, or stored. Files
