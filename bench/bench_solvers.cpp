@@ -90,8 +90,8 @@ int main(int argc, char** argv) {
   mesh = mesh.with_orders(EntityOrders::uniform(mesh.space.topology(), order));
   FitTarget target(sample.target);
   for (std::size_t i = 0; i < mesh.coefficients.size(); ++i) {
-    if (i < mesh.space.num_vertices()) mesh.coefficients[i] -= target.normalisation.centre;
-    mesh.coefficients[i] /= target.normalisation.diagonal;
+    if (i < mesh.space.num_vertices()) mesh.coefficients[i] -= target.normalization.center;
+    mesh.coefficients[i] /= target.normalization.diagonal;
   }
   const BoundarySamples samples = make_boundary_samples(mesh.space, kIntervals);
   target.sample(samples.points.size());

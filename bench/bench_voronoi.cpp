@@ -120,7 +120,7 @@ void report(const char* name, const TriangleMesh& mesh, const std::vector<Vec3>&
       last ? "" : ",");
 }
 
-std::vector<Vec3> barycentres(const TriangleMesh& mesh) {
+std::vector<Vec3> barycenters(const TriangleMesh& mesh) {
   std::vector<Vec3> result;
   for (const auto& t : mesh.triangles)
     result.push_back((mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3);
@@ -158,7 +158,7 @@ int main(int argc, char** argv) {
     TriangleMesh far = bumpy_sphere(n, 0);
     for (Vec3& p : far.positions) p = 1.8 * p + Vec3(0.1, 0.05, -0.07);
     report("far, target by samples", target, far.positions);
-    report("far, samples by target", far, barycentres(target), n == 32);
+    report("far, samples by target", far, barycenters(target), n == 32);
   }
   std::printf("]}\n");
 }

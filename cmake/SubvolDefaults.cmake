@@ -25,7 +25,7 @@ endif()
 add_library(subvol_defaults INTERFACE)
 # Headers that are no part of the library are named from the root of the project.
 target_include_directories(subvol_defaults INTERFACE "${PROJECT_SOURCE_DIR}")
-# Options are set by designated initialisers; what is left out has its default.
+# Options are set by designated initializers; what is left out has its default.
 target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wno-missing-field-initializers)
 if(NOT SUBVOL_UNITY)  # in a unit of several files, names of one hide those of another
   target_compile_options(subvol_defaults INTERFACE -Wshadow)

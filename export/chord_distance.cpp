@@ -9,7 +9,7 @@
 namespace subvol::internal {
 namespace {
 
-constexpr double kNeighbourReach = 0.25;  // relative to the triangle's size; farther out the neighbor may bend away
+constexpr double kNeighborReach = 0.25;  // relative to the triangle's size; farther out the neighbor may bend away
 
 double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
@@ -29,7 +29,7 @@ class Triangle {
     const double size = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
     for (int k = 0; k < 3; ++k) {
       inward_[k] = area_.cross(corners_[(k + 1) % 3] - corners_[k]).normalized();
-      reach_[k] = k == hard_edge ? 0 : kNeighbourReach * size;
+      reach_[k] = k == hard_edge ? 0 : kNeighborReach * size;
     }
   }
 

@@ -24,7 +24,7 @@ struct SeenFaces {
   std::vector<Index> faces, cells;
 };
 
-Vec3 centre(const HighOrderMesh& mesh, std::size_t c) {
+Vec3 center(const HighOrderMesh& mesh, std::size_t c) {
   Vec3 sum = Vec3::Zero();
   for (const Index v : mesh.space.vertices(c)) sum += mesh.coefficients[v];
   return sum / static_cast<double>(mesh.space.vertices(c).size());
@@ -33,15 +33,14 @@ Vec3 centre(const HighOrderMesh& mesh, std::size_t c) {
 /// Returns for each cell whether it stays: true if its center lies up to the plane.
 std::vector<char> kept_cells(const HighOrderMesh& mesh, const CutPlane& plane) {
   constexpr double kRounding = 1e-9;  // share of the extent by which the centers of one layer may differ
-  Eigen::AlignedBox3d box, centres;
+  Eigen::AlignedBox3d box, centers;
   for (std::size_t v = 0; v < mesh.space.num_vertices(); ++v) box.extend(mesh.coefficients[v]);
-  for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) centres.extend(centre(mesh, c));
+  for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) centers.extend(center(mesh, c));
   int axis = plane.axis;
   if (axis == CutPlane::kShortest) box.sizes().minCoeff(&axis);
-  const double place =
-      centres.min()[axis] + plane.share * centres.sizes()[axis] + kRounding * box.sizes()[axis];
+  const double place = centers.min()[axis] + plane.share * centers.sizes()[axis] + kRounding * box.sizes()[axis];
   std::vector<char> kept;
-  for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) kept.push_back(centre(mesh, c)[axis] <= place ? 1 : 0);
+  for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) kept.push_back(center(mesh, c)[axis] <= place ? 1 : 0);
   return kept;
 }
 

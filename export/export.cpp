@@ -104,7 +104,7 @@ void color_by_quality(ScenePrimitive& surface, std::vector<double> vertex_qualit
 
 Scene make_scene(ScenePrimitive surface, const Segments& wires, const SurfaceSceneOptions& options) {
   Scene scene{.name = options.name,
-              .metres_per_unit = options.metres_per_unit,
+              .meters_per_unit = options.meters_per_unit,
               .up_axis = options.up_axis,
               .options = options.options,
               .quantize = options.quantize};
@@ -114,7 +114,7 @@ Scene make_scene(ScenePrimitive surface, const Segments& wires, const SurfaceSce
   if (surface.colors.empty())
     surface.material_color = kPlainColor;
   else
-    scene.extras.emplace_back("colour_map", kQualityColorMap);
+    scene.extras.emplace_back("color_map", kQualityColorMap);
   ScenePrimitive wire = options.wireframe ? wire_primitive(surface.positions, wires) : ScenePrimitive{};
   scene.nodes.push_back({"surface", std::move(surface)});
   if (options.wireframe) scene.nodes.push_back({"wireframe", std::move(wire)});
@@ -249,11 +249,11 @@ Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_qualit
   return make_scene(std::move(primitive), edges_of(mesh, shaded), options);
 }
 
-Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_map,
+Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& color_map,
                   const SurfaceSceneOptions& options) {
   if (sheets.empty()) throw InputError("sheet_scene: expected at least one sheet");
   Scene scene{.name = options.name,
-              .metres_per_unit = options.metres_per_unit,
+              .meters_per_unit = options.meters_per_unit,
               .up_axis = options.up_axis,
               .options = options.options,
               .quantize = options.quantize};
@@ -285,7 +285,7 @@ Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_
   }
   scene.origin = box.center();
   if (!options.source.empty()) scene.extras.emplace_back("source", options.source);
-  if (!colour_map.empty()) scene.extras.emplace_back("colour_map", colour_map);
+  if (!color_map.empty()) scene.extras.emplace_back("color_map", color_map);
   if (options.wireframe) scene.nodes.push_back({"wireframe", std::move(wires)});
   return scene;
 }

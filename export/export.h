@@ -23,7 +23,7 @@ struct SurfaceSceneOptions {
   double crease_angle_degrees = 30;     ///< faces that meet at a larger angle are not shaded smoothly, in [0, 180]
   bool wireframe = true;                ///< adds a node with the cells' edges as lines
   bool quantize = false;                ///< writes a smaller file: `Scene::quantize`
-  double metres_per_unit = 1;           ///< > 0
+  double meters_per_unit = 1;           ///< > 0
   UpAxis up_axis = UpAxis::y;
   std::string source{};                 ///< file that the result was made from; stored in the extras
   SceneValues options{};                ///< options in force; stored in the extras
@@ -82,9 +82,9 @@ struct SceneSheet {
   std::vector<std::array<Index, 2>> wires{};  ///< edges to draw, by vertex; empty: the edges of all polygons
 };
 
-/// Several sheets with their flat faces, and one "wireframe" with the edges of all. `colour_map` names what the shades
+/// Several sheets with their flat faces, and one "wireframe" with the edges of all. `color_map` names what the shades
 /// show. InputError: no sheets, arrays whose length is not the number of vertices.
-Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_map,
+Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& color_map,
                   const SurfaceSceneOptions& options = {});
 
 /// Polygons as they are. face_quality: one scaled Jacobian per face, or empty (no colors then).

@@ -345,8 +345,8 @@ gltf::Value to_object(const SceneValues& values) {
 
 gltf::Value extras(const Scene& scene) {
   auto object = to_object(scene.extras).Get<gltf::Value::Object>();
-  object["unit"] = gltf::Value(std::string("metre"));
-  object["metres_per_input_unit"] = gltf::Value(scene.metres_per_unit);
+  object["unit"] = gltf::Value(std::string("meter"));
+  object["meters_per_input_unit"] = gltf::Value(scene.meters_per_unit);
   object["up_axis"] = gltf::Value(std::string(scene.up_axis == UpAxis::y ? "y" : "z"));
   object["version"] = gltf::Value(std::string(version()));
   object["options"] = to_object(scene.options);
@@ -357,7 +357,7 @@ gltf::Node root_node(const Scene& scene, std::vector<int> children) {
   gltf::Node root;
   root.name = scene.name;
   root.children = std::move(children);
-  const double s = scene.metres_per_unit;
+  const double s = scene.meters_per_unit;
   Vec3 translation = s * scene.origin;
   if (scene.up_axis == UpAxis::z) {
     root.rotation = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
@@ -383,9 +383,9 @@ Placement placement(const Scene& scene) {
 
 gltf::Model model_of(const Scene& scene) {
   if (scene.nodes.empty()) throw InputError("scene: expected at least one node");
-  if (!(scene.metres_per_unit > 0) || !std::isfinite(scene.metres_per_unit))
-    throw InputError("scene: metres_per_unit: expected a positive number");
-  if (!(scene.metres_per_unit * scene.origin).allFinite()) throw InputError("scene: origin: expected finite numbers");
+  if (!(scene.meters_per_unit > 0) || !std::isfinite(scene.meters_per_unit))
+    throw InputError("scene: meters_per_unit: expected a positive number");
+  if (!(scene.meters_per_unit * scene.origin).allFinite()) throw InputError("scene: origin: expected finite numbers");
   if (!(scene.seconds_per_shape > 0) || !std::isfinite(scene.seconds_per_shape))
     throw InputError("scene: seconds_per_shape: expected a positive number");
   gltf::Model model;

@@ -16,7 +16,7 @@ enum class GltfContainer {
 
 /// Returns a scene as the bytes of a glTF 2.0 file; equal scenes give equal bytes.
 ///
-///   world = metres_per_unit R origin + metres_per_unit R p,   p = float(position - origin),   R: up axis to y
+///   world = meters_per_unit R origin + meters_per_unit R p,   p = float(position - origin),   R: up axis to y
 ///
 /// A quantized scene has its coordinates in units of its half extent u: p = u q / 32767, and its nodes are scaled by u.
 ///
@@ -30,7 +30,7 @@ enum class GltfContainer {
 /// InputError, naming node and array: no nodes; a node without positions or indices; arrays of unequal length; an index
 /// out of range; a number that is not finite, or overflows float32; positions that are all below 1e-30; a normal whose
 /// length is not 1 within 1e-6; a color outside [0, 1]; an attribute name that is not an underscore and capitals;
-/// shapes of lines; metres_per_unit or seconds_per_shape not positive, or times of shapes that coincide in float32;
+/// shapes of lines; meters_per_unit or seconds_per_shape not positive, or times of shapes that coincide in float32;
 /// text that is not UTF-8; more than 2^31 bytes.
 std::string gltf_bytes(const Scene& scene, GltfContainer container);
 

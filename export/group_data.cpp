@@ -52,7 +52,7 @@ void read_faces(const VtuArrays& file, std::size_t num_points, std::size_t num_g
       file.fail(std::string(kOfFaces) + ": face " + std::to_string(f) + ": expected the place of a group of faces");
     groups.faces.push_back({face_key({&points[4 * f], size}), of_faces[f]});
   }
-  normalise(groups);
+  normalize(groups);
 }
 
 }  // namespace

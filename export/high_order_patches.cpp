@@ -23,10 +23,10 @@ constexpr double kVanishes = 1e-13;
 Vec3 patch_point(const std::vector<Vec3>& corners, std::size_t corner, double u, double v) {
   const std::size_t n = corners.size();
   const Vec3 &here = corners[corner], &next = corners[(corner + 1) % n], &before = corners[(corner + n - 1) % n];
-  Vec3 centre = Vec3::Zero();
-  for (const Vec3& c : corners) centre += c / static_cast<double>(n);
+  Vec3 center = Vec3::Zero();
+  for (const Vec3& c : corners) center += c / static_cast<double>(n);
   const Vec3 ahead = (here + next) / 2, behind = (here + before) / 2;
-  return (1 - u) * (1 - v) * here + u * (1 - v) * ahead + u * v * centre + (1 - u) * v * behind;
+  return (1 - u) * (1 - v) * here + u * (1 - v) * ahead + u * v * center + (1 - u) * v * behind;
 }
 
 }  // namespace

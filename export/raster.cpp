@@ -14,7 +14,7 @@ namespace subvol {
 namespace {
 
 constexpr int kSamples = 2;  ///< per pixel, in each direction
-constexpr LinearColor kGrey{0.35, 0.40, 0.45, 1};
+constexpr LinearColor kGray{0.35, 0.40, 0.45, 1};
 constexpr double kAmbient = 0.3;
 constexpr double kWireShade = 0.35;  ///< factor on the surface's color
 
@@ -30,7 +30,7 @@ class Canvas {
       : width_(width * kSamples),
         height_(height * kSamples),
         scale_(std::min(width_, height_) / (2 * view.radius)),
-        centre_(view.centre),
+        center_(view.center),
         depths_(static_cast<std::size_t>(width_) * height_, -std::numeric_limits<double>::infinity()),
         colors_(depths_.size(), Vec3::Zero()),
         wired_(depths_.size()) {
@@ -43,7 +43,7 @@ class Canvas {
 
   /// Sample coordinates, x to the right and y down, and depth, which grows toward the viewer.
   Vec3 project(const Vec3& p) const {
-    const Vec3 q = scale_ * (axes_ * (p - centre_));
+    const Vec3 q = scale_ * (axes_ * (p - center_));
     return {0.5 * width_ + q[0], 0.5 * height_ - q[1], q[2]};
   }
 
@@ -124,7 +124,7 @@ class Canvas {
 
   int width_, height_;
   double scale_;  // samples per unit of length
-  Vec3 centre_;
+  Vec3 center_;
   Mat3 axes_;     // rows: right, up, toward the viewer
   std::vector<double> depths_;
   std::vector<Vec3> colors_;   // linear
@@ -150,7 +150,7 @@ RasterView view_of(std::span<const Vec3> positions) {
   view.towards_viewer[along] = 0.25;
   view.towards_viewer[beside] = 0.45;
   view.up = Vec3::Unit(beside);
-  view.centre = box.center();
+  view.center = box.center();
   view.radius = 0.5 * box.diagonal().norm();
   return view;
 }
@@ -161,7 +161,7 @@ Image rasterize(const RasterSurface& surface, const RasterView& view, int width,
     throw InputError("rasterize: expected 1 to " + std::to_string(kMostPixels) + " pixels a side");
   const std::vector<Vec3>& x = surface.mesh.positions;
   if (!surface.colors.empty() && surface.colors.size() != x.size())
-    throw InputError("rasterize: expected one colour per vertex");
+    throw InputError("rasterize: expected one color per vertex");
   Canvas canvas(view, width, height);
   std::vector<Vec3> projected;
   for (const Vec3& p : x) projected.push_back(canvas.project(p));
@@ -172,7 +172,7 @@ Image rasterize(const RasterSurface& surface, const RasterView& view, int width,
     const double shade = canvas.shade(normal.normalized());
     std::array<Vec3, 3> corners, colors;
     for (int k = 0; k < 3; ++k) {
-      const LinearColor& color = surface.colors.empty() ? kGrey : surface.colors[triangle[k]];
+      const LinearColor& color = surface.colors.empty() ? kGray : surface.colors[triangle[k]];
       corners[k] = projected[triangle[k]];
       colors[k] = shade * Vec3(color[0], color[1], color[2]);
     }

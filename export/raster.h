@@ -22,7 +22,7 @@ struct Image {
 struct RasterView {
   Vec3 towards_viewer = Vec3(0, 0, 1);  ///< any length but zero
   Vec3 up = Vec3(0, 1, 0);              ///< not parallel to towards_viewer
-  Vec3 centre = Vec3::Zero();
+  Vec3 center = Vec3::Zero();
   double radius = 1;                    ///< > 0, of the ball that fits into the picture's shorter side
 };
 

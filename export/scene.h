@@ -70,7 +70,7 @@ struct Scene {
   std::string name{};             ///< name of the root node
   std::vector<SceneNode> nodes{};
   Vec3 origin = Vec3::Zero();     ///< mesh units; the middle of the bounding box is a good choice
-  double metres_per_unit = 1;     ///< > 0
+  double meters_per_unit = 1;     ///< > 0
   UpAxis up_axis = UpAxis::y;     ///< y: axes stay as they are; z: the root turns by -90 degrees about x
   SceneValues extras{};           ///< source, color map, ...; the writer adds unit, up_axis and version
   SceneValues options{};          ///< the options in force, written as extras.options

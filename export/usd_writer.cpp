@@ -96,8 +96,8 @@ void require_options(const UsdOptions& options) {
   if (name.empty() || !inside(name[0]) || (name[0] >= '0' && name[0] <= '9') ||
       !std::all_of(name.begin(), name.end(), inside))
     throw InputError("usd: name \"" + name + "\": expected letters, digits and underscores, no digit first");
-  if (!(options.metres_per_unit > 0) || !std::isfinite(options.metres_per_unit))
-    throw InputError("usd: metres_per_unit: expected a positive number");
+  if (!(options.meters_per_unit > 0) || !std::isfinite(options.meters_per_unit))
+    throw InputError("usd: meters_per_unit: expected a positive number");
 }
 
 /// Appends one attribute line: `    type name = [a, b, ...]`.
@@ -268,7 +268,7 @@ std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const Usd
   if (options.tets && !consists_of_tets(*options.tets)) throw InputError("usd: TetMesh: expected tets alone");
   std::string text = "#usda 1.0\n(\n    defaultPrim = \"" + options.name + "\"\n    doc = \"subvol " + version() +
                      "\"\n    metersPerUnit = ";
-  append_number(text, options.metres_per_unit);
+  append_number(text, options.meters_per_unit);
   text += std::string("\n    upAxis = \"") + (options.up_axis == UpAxis::y ? "Y" : "Z") + "\"\n)\n\ndef Mesh \"" +
           options.name + "\"\n{\n";
   append_geometry(text, cage);

@@ -14,7 +14,7 @@ namespace subvol {
 /// Entries for the head of a .usda file.
 struct UsdOptions {
   std::string name = "cage";   ///< name of the prim: letters, digits, underscores; no digit first
-  double metres_per_unit = 1;  ///< > 0
+  double meters_per_unit = 1;  ///< > 0
   UpAxis up_axis = UpAxis::y;  ///< declared, not applied: coordinates are written unchanged
   const VolumeMesh* tets = nullptr;  ///< cells, all tets, to write as a TetMesh "cells" beside the cage; null: none
 };
@@ -38,7 +38,7 @@ bool consists_of_tets(const VolumeMesh& mesh);
 ///
 /// InputError: cells other than tets; a mesh without faces, with indices out of range or with coordinates that are not
 /// finite; coordinates that, as written, exceed the range of float32; a tag that names no vertex or no edge of the
-/// cage, or has a sharpness that is not positive; a name that is not a USD identifier; metres_per_unit not positive.
+/// cage, or has a sharpness that is not positive; a name that is not a USD identifier; meters_per_unit not positive.
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options = {});
 
 /// Writes `usd_text` to a .usda file, the whole text or nothing. InputError: another extension. IoError: the file

@@ -184,7 +184,7 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
     fruitless = cells.size() < fewest ? 0 : fruitless + 1;
     fewest = std::min(fewest, cells.size());
     if (cells.empty() || fruitless == kFruitless) break;
-    if (!relaxed_at_) relaxed_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
+    if (!relaxed_at_) relaxed_at_ = target_.normalization.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
     const std::vector<Vec3> before = unknowns();
     const bool going =
@@ -246,8 +246,8 @@ bool AutomaticDriver::polish() {
 bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,
                                    std::optional<CreaseDistance> edges, std::span<const UnfollowedCurve> unfollowed) {
   trial.least_share = state_.cells.least_share;
-  if (edges) edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
-  std::vector<MissedEdge> missed = missed_edges(unfollowed, target_.normalisation);
+  if (edges) edges->farthest = target_.normalization.from_unit({edges->farthest})[0];
+  std::vector<MissedEdge> missed = missed_edges(unfollowed, target_.normalization);
   trial.long_edges_lost = num_long_edges_lost(missed);
   if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
   result_.cage = cage_ ? cage_->cage : VolumeMesh();
@@ -267,10 +267,10 @@ AutomaticFitResult AutomaticDriver::finish() {
         "details of the target are narrower than the mesh's cells: the mesh met itself or had poor cells there; it was "
         "relaxed and follows the target less closely, first at " +
         to_text(*best().relaxed_at) + "; more cells may hold the details");
-  const Normalisation& normalisation = target_.normalisation;
-  result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
-  result_.cage.positions = normalisation.from_unit(std::move(result_.cage.positions));
-  for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));
+  const Normalization& normalization = target_.normalization;
+  result_.mesh.positions = normalization.from_unit(std::move(result_.mesh.positions));
+  result_.cage.positions = normalization.from_unit(std::move(result_.cage.positions));
+  for (FitState& state : result_.states) state.positions = normalization.from_unit(std::move(state.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};
   return std::move(result_);
 }

@@ -161,7 +161,7 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
     no_template_ = "target: " + why_no_grid(*diagnosis_, options.cells, made.wanted) + "; give a --template";
     return std::nullopt;
   }
-  target_.normalisation.take_in(made.templates.front().mesh);
+  target_.normalization.take_in(made.templates.front().mesh);
   return std::move(made.templates.front());
 }
 
@@ -240,10 +240,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
 std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surface) const {
   std::optional<FeatureMiss> miss = largest_feature_miss(features_, ClosestPoint(surface));
   if (!miss) return miss;
-  miss->place = target_.normalisation.from_unit({miss->place})[0];
+  miss->place = target_.normalization.from_unit({miss->place})[0];
   miss->size_percent = 100 * miss->size;
-  miss->distance *= target_.normalisation.diagonal;
-  miss->size *= target_.normalisation.diagonal;
+  miss->distance *= target_.normalization.diagonal;
+  miss->size *= target_.normalization.diagonal;
   return miss;
 }
 
@@ -470,9 +470,9 @@ bool AutomaticFit::run_graded() {
     for (const Index c : fault) places.push_back(cell_center(result_.mesh, result_.mesh.positions, c));
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
-                                                    target_.normalisation.from_unit(std::move(places)), most, stop);
+                                                    target_.normalization.from_unit(std::move(places)), most, stop);
   if (!graded) return !stop.is_stopped();
-  target_.normalisation.take_in(graded->mesh);
+  target_.normalization.take_in(graded->mesh);
   layout_.reset();
   cage_.reset();
   mesh_ = std::move(graded->mesh);

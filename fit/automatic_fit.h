@@ -187,7 +187,7 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
 /// Fills several regions with hexes whose interfaces conform: the references of cells are the regions' numbers, and
 /// faces between regions are in groups (`add_interface_groups`).
 ///
-/// The template is a grid labelled by region (`region_template`), with layers of cells on both sides of sheets: those
+/// The template is a grid labeled by region (`region_template`), with layers of cells on both sides of sheets: those
 /// of designed parts end at sheets that need none (`pad_sheets`), others are closed (`pillow_regions`). Sheets of
 /// regions (a, b) and the target's triangles between a and b correspond to each other and to nothing else. If the
 /// target is a designed part, sharp edges and the curves where sheets meet are routed on the sheets (`sheet_layout`),

@@ -127,10 +127,10 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
   return true;
 }
 
-std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalisation& normalisation) {
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalization& normalization) {
   std::vector<MissedEdge> missed;
   for (const UnfollowedCurve& curve : unfollowed)
-    missed.push_back({curve.reason, normalisation.from_unit({curve.place})[0], 100 * curve.length});
+    missed.push_back({curve.reason, normalization.from_unit({curve.place})[0], 100 * curve.length});
   std::stable_sort(missed.begin(), missed.end(),
                    [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
   return missed;

@@ -65,7 +65,7 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
 
 /// Returns the curves that no path follows, longest first, in the target's own coordinates.
 /// unfollowed  in normalized coordinates.
-std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalisation& normalisation);
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const Normalization& normalization);
 
 /// Returns the number of edges longer than `kLongEdgePercent` that cells could follow: all but those that are too
 /// acute.

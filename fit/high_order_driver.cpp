@@ -67,7 +67,7 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
       memory_(options.memory_limit_bytes, kMemoryOfNode),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
                options.log}) {
-  target_.normalisation.take_in(template_);
+  target_.normalization.take_in(template_);
   mesh_.coefficients = template_.positions;
   creases_ = creases_along_target(target_, crease_rule(), template_);
 }
@@ -363,13 +363,13 @@ std::vector<Index> HighOrderDriver::far_cells(double percent) const {
 }
 
 std::vector<Vec3> HighOrderDriver::in_target_units(std::vector<Vec3> coefficients) const {
-  const auto& [centre, diagonal] = target_.normalisation;
-  return moved(std::move(coefficients), mesh_.space.num_vertices(), diagonal, centre);
+  const auto& [center, diagonal] = target_.normalization;
+  return moved(std::move(coefficients), mesh_.space.num_vertices(), diagonal, center);
 }
 
 HighOrderMesh HighOrderDriver::in_unit(HighOrderMesh mesh) const {
-  const auto& [centre, diagonal] = target_.normalisation;
-  mesh.coefficients = moved(std::move(mesh.coefficients), mesh.space.num_vertices(), 1 / diagonal, -centre / diagonal);
+  const auto& [center, diagonal] = target_.normalization;
+  mesh.coefficients = moved(std::move(mesh.coefficients), mesh.space.num_vertices(), 1 / diagonal, -center / diagonal);
   return mesh;
 }
 

@@ -404,7 +404,7 @@ HighOrderFitResult HighOrderFit::concluded(const Work& work) {
     end_for_memory(formatted("no memory was left at order %d", order_));
   }
   report_.creases = measured_creases();
-  if (report_.creases) report_.creases->farthest = target_.normalisation.from_unit({report_.creases->farthest})[0];
+  if (report_.creases) report_.creases->farthest = target_.normalization.from_unit({report_.creases->farthest})[0];
   report_.seconds = {{"total", runner_.seconds()}};
   mesh_.coefficients = in_target_units(std::move(mesh_.coefficients));
   for (FitState& state : states_) state.positions = in_target_units(std::move(state.positions));

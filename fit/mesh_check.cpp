@@ -216,8 +216,8 @@ void append_quality(std::string& text, const QualityReport& quality) {
              quality.histogram[bin]);
   append(text, "\nworst cells\n");
   for (std::size_t i = 0; i < std::min<std::size_t>(5, quality.worst_cells.size()); ++i) {
-    const auto& [cell, centre, value] = quality.worst_cells[i];
-    append(text, "  %-8d %.4f at (%.6g, %.6g, %.6g)\n", static_cast<int>(cell), value, centre[0], centre[1], centre[2]);
+    const auto& [cell, center, value] = quality.worst_cells[i];
+    append(text, "  %-8d %.4f at (%.6g, %.6g, %.6g)\n", static_cast<int>(cell), value, center[0], center[1], center[2]);
   }
 }
 

@@ -65,7 +65,7 @@ OptimizeDriver::OptimizeDriver(const VolumeMesh& mesh, const TriangleMesh* targe
       relief_(mesh.num_cells(), 1),
       runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
                options.cancelled, options.log}) {
-  target_.normalisation.take_in(mesh_);
+  target_.normalization.take_in(mesh_);
   target_.keep_interfaces(mesh_);
   interfaces_ = find_interfaces(mesh_, topology_);
   marks_ = mark_interfaces(topology_, interfaces_);

@@ -271,7 +271,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {
-    result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
+    result.mesh.positions = target_.normalization.from_unit(mesh_.positions);
   } else {
     mesh_.positions = std::move(start_positions);
     report_.undo_stages(0, report_.stages.size());

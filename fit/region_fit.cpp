@@ -45,9 +45,9 @@ namespace {
 constexpr double kAskedShare = 0.85, kRetryShare = 0.95;
 constexpr int kGridTries = 3;
 
-RegionSurface normalised(RegionSurface surface, const Normalisation& normalisation) {
-  surface.mesh.positions = normalisation.to_unit(std::move(surface.mesh.positions));
-  for (double& volume : surface.volumes) volume /= std::pow(normalisation.diagonal, 3);
+RegionSurface normalized(RegionSurface surface, const Normalization& normalization) {
+  surface.mesh.positions = normalization.to_unit(std::move(surface.mesh.positions));
+  for (double& volume : surface.volumes) volume /= std::pow(normalization.diagonal, 3);
   return surface;
 }
 
@@ -57,7 +57,7 @@ class RegionFit : AutomaticDriver {
   RegionFit(const RegionSurface& target, const AutomaticFitOptions& options)
       : AutomaticDriver(options, target),
         original_(target),
-        unit_(normalised(target, target_.normalisation)),
+        unit_(normalized(target, target_.normalization)),
         tree_(unit_.mesh) {}
   AutomaticFitResult run();
 
@@ -121,7 +121,7 @@ std::string crowded_curve(const RegionSurface& target) {
   return text;
 }
 
-/// Returns a labelled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit
+/// Returns a labeled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit
 /// must end.
 std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   RegionTemplateOptions options;
@@ -147,7 +147,7 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   }
   VolumeMesh mesh = std::move(made.made->mesh);
   template_ = std::move(*made.made);
-  target_.normalisation.take_in(mesh);
+  target_.normalization.take_in(mesh);
   least_edge_ =
       least_edge_share(mesh, wanted_lengths(MeshTopology(mesh), {}, mesh.num_cells(), target_.surface.area()));
   return mesh;

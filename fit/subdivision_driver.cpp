@@ -56,7 +56,7 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   require_no_pyramids(template_.kinds,
                       "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
-  target_.normalisation.take_in(template_);
+  target_.normalization.take_in(template_);
   template_creases_ = creases_along_target(target_, crease_rule(), template_);
 }
 
@@ -314,13 +314,13 @@ bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
 /// Stores the whole state or nothing, since memory may run out here.
 void SubdivisionDriver::store_result() {
   FitResult stored{cage_, level_.mesh, {}, states_};
-  stored.cage.positions = target_.normalisation.from_unit(unknowns_);
-  stored.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
-  for (FitState& state : stored.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
+  stored.cage.positions = target_.normalization.from_unit(unknowns_);
+  stored.mesh.positions = target_.normalization.from_unit(level_.nodes.apply(unknowns_));
+  for (FitState& state : stored.states) state.positions = target_.normalization.from_unit(std::move(state.positions));
   if (!creases_.curves().empty()) {
     const TriangleMesh limit = limit_triangles();
     CreaseDistance creases = creases_.distance(limit_check_->crease_edges, limit.positions, 1);
-    creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
+    creases.farthest = target_.normalization.from_unit({creases.farthest})[0];
     result_.report.creases = creases;
   }
   result_.cage = std::move(stored.cage);

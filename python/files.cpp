@@ -36,7 +36,7 @@ struct Writing {
     Keywords keywords("write", given);
     options.chord_percent = cli::kSceneChordPercent;
     take_chord(keywords, options);
-    keywords.take("unit", options.metres_per_unit);
+    keywords.take("unit", options.meters_per_unit);
     keywords.take("up", options.up_axis, {{"y", std::string("y")}, {"z", std::string("z")}});
     take_cut(keywords);
     bool wireframe = true;
@@ -170,12 +170,12 @@ check  refuse volume meshes that are not sound, but for inverted cells and unuse
 Writes a mesh or a result; the extension chooses the format (`subvol formats` lists them). A file of that name is
 replaced, once the new one is whole.
 
-what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; in a scene the limit surface, coloured by
+what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; in a scene the limit surface, colored by
            the quality of the cells; 'cage:FILE' is the cage, 'animation:FILE.glb' the fit as it went where its states
            were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside,
            'boundary:FILE.vtu', .vtk or .xdmf holds the faces of the boundary with their groups
 chord      how close triangles are to a curved surface, per cent of its bounding box's diagonal
-unit, up   metres a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
+unit, up   meters a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
 cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stands across, also with a place between 0
            and 1 as 'z:0.3'; None: across the mesh's shortest extent, halfway
 wireframe  scenes show the edges of the cells

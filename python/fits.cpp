@@ -258,7 +258,7 @@ point_weights   of points: all count alike, 'equal', or by the area they stand f
 keep_states     fills states of the result, which write("animation:FILE.glb", ...) shows
 max_iterations  per stage; 0: the schedule's own
 time_limit      seconds; 0: none
-checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimisations end, and
+checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimizations end, and
                 however the call ends
 resume          checkpoint of an earlier call with the same target, template and options: goes on where that ended
 chord           how close triangles are to the surface that is measured, per cent of its diagonal
@@ -313,7 +313,7 @@ void add_fits(py::module_& module) {
           states.append(py::make_tuple(state.name, shown_points(state.positions, self)));
         return states;
       },
-      "Where the cage's points, or the coefficients of curved cells, were before each minimisation, if kept: list of\n"
+      "Where the cage's points, or the coefficients of curved cells, were before each minimization, if kept: list of\n"
       "(name, array).");
   module.def("fit", [](const py::object& target, const py::object& template_mesh, const py::kwargs& given) {
     return Fit(target, template_mesh, given).run();

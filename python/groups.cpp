@@ -78,7 +78,7 @@ VolumeFaceGroups take_volume_groups(Keywords& keywords, std::size_t num_points) 
     if (face.size() < 3) throw InputError("grouped_faces: row " + std::to_string(f) + " has fewer than three points");
     groups.faces.push_back({face_key(face), of_face[f]});
   }
-  normalise(groups);
+  normalize(groups);
   return groups;
 }
 

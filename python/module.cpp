@@ -56,7 +56,7 @@ void add_progress(py::module_& module) {
       .def_readonly("stage", &Progress::stage, "What is being done: str.")
       .def_readonly("level", &Progress::level, "Level of subdivision; 0: there are none.")
       .def_readonly("iteration", &Progress::iteration, "Step of the stage.")
-      .def_readonly("energy", &Progress::energy, "What is minimised, after the step.")
+      .def_readonly("energy", &Progress::energy, "What is minimized, after the step.")
       .def_readonly("fraction", &Progress::fraction, "Estimate of the share done, in [0, 1].");
 }
 

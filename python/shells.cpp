@@ -217,7 +217,7 @@ skip          list of patches without layers: names or numbers of groups, or poi
 repair        faults of the surface are repaired by changes within this distance, as text: a length, or '2%'; '0': none
 side          'outward' where the faces' normals point, 'inward', or 'both'
 free_surface  the surface's points may slide along it for the cells' sake
-straight      straight columns, no optimisation
+straight      straight columns, no optimization
 crease_angle  degrees: edges of the surface sharper than this become creases as well
 order         of the cells, 1 .. 16; above 1 they are curved, but for the surface itself
 basis         of curved cells: 'legendre' or 'fourier'

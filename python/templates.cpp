@@ -254,7 +254,7 @@ size     about how long a cell is)");
             R"(carve(mesh, *, inside=None, share=0.5, box=None, list=None, invert=False)
 --
 
-Keeps the cells that lie in a surface by so much of their volume, or whose centre is in a box, or that are listed; or,
+Keeps the cells that lie in a surface by so much of their volume, or whose center is in a box, or that are listed; or,
 with invert, the others.)");
   group.def("extrude", &make_extruded, py::arg("surface"),
             R"(extrude(surface, *, thickness, layers=1, growth=1.0, direction=None)

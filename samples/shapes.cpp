@@ -97,7 +97,7 @@ VolumeMesh torus_ring(int num_sections) {
   return mesh;
 }
 
-// Takes the cube [-1,1]^3 to a ball, spheres about its centre from cubes about it.
+// Takes the cube [-1,1]^3 to a ball, spheres about its center from cubes about it.
 Vec3 cube_to_ball(const Vec3& p) {
   const double length = p.norm();
   return length > 0 ? Vec3(p * (p.cwiseAbs().maxCoeff() / length)) : p;

@@ -46,18 +46,18 @@ void check_options(const PolygonMesh& surface, const ShellOptions& options) {
 
 /// Maps a surface to a box of diagonal 1 around the origin, and results back.
 struct Normalization {
-  Vec3 centre;
+  Vec3 center;
   double scale;  ///< diagonal of the surface's bounding box, in the caller's unit
 
   explicit Normalization(const PolygonMesh& surface) {
     Eigen::AlignedBox3d box;
     for (const Vec3& p : surface.positions) box.extend(p);
-    centre = box.center();
+    center = box.center();
     scale = box.diagonal().norm();
     if (!(scale > 0) || !std::isfinite(scale)) throw InputError("shell: the surface has no finite extent");
   }
   PolygonMesh normalized(PolygonMesh surface) const {
-    for (Vec3& p : surface.positions) p = (p - centre) / scale;
+    for (Vec3& p : surface.positions) p = (p - center) / scale;
     return surface;
   }
 };
@@ -357,7 +357,7 @@ void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   for (std::size_t i = 0; i < positions_.size(); ++i)
     result.mesh.positions[i] = !options_.free_surface && layers.strand(static_cast<Index>(i)) == kNoIndex
                                    ? surface.positions[i % layers.num_columns()]
-                                   : Vec3(normalization_.centre + scale * positions_[i]);
+                                   : Vec3(normalization_.center + scale * positions_[i]);
   result.asked = std::move(asked_);
   result.limited = std::move(thickness_);
   for (double& t : result.asked) t *= scale;

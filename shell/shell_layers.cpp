@@ -280,7 +280,7 @@ VolumeFaceGroups shell_groups(const ShellLayers& layers) {
       result.faces.push_back({face_key(corners), rim});
     }
   }
-  normalise(result);
+  normalize(result);
   return result;
 }
 

@@ -17,9 +17,9 @@ except (ImportError, OSError):
 
 def local(name, at):
     """Gmsh's coordinates of canonical ones, and what the derivatives by the former are multiplied with."""
-    centred = (0, 1, 2) if name.startswith("Hexahedron") else (2,) if name.startswith("Prism") else ()
+    centered = (0, 1, 2) if name.startswith("Hexahedron") else (2,) if name.startswith("Prism") else ()
     result, scale = np.array(at), np.ones(3)
-    for axis in centred:
+    for axis in centered:
         result[:, axis] = 2 * result[:, axis] - 1
         scale[axis] = 2
     return result, scale

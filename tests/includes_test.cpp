@@ -333,7 +333,7 @@ TEST_CASE("No source uses ranges that Clang 14 does not compile", "[includes]") 
   }
 }
 
-TEST_CASE("Every source says its licence in the first line", "[includes]") {
+TEST_CASE("Every source says its license in the first line", "[includes]") {
   for (const Source& source : all_sources()) {
     std::ifstream stream(fs::path(subvol::test::source_dir()) / source.path);
     std::string first;

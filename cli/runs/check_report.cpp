@@ -23,7 +23,7 @@ std::vector<Index> not_certified_cells(const MeshCheck& check) {
 Json quality_json(const QualityReport& quality) {
   Json worst = Json::array();
   for (const auto& cell : quality.worst_cells) {
-    worst.push_back({{"cell", cell.cell}, {"centre", point_json(cell.centre)}, {"scaled_jacobian", cell.value}});
+    worst.push_back({{"cell", cell.cell}, {"center", point_json(cell.center)}, {"scaled_jacobian", cell.value}});
   }
   return {{"cells", quality.num_cells},
           {"min_scaled_jacobian", quality.min_scaled_jacobian},

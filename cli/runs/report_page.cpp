@@ -51,7 +51,7 @@ std::string heading(const Json& report) {
   return text + "</p>\n";
 }
 
-std::string colour_scale(const ReportPicture& picture) {
+std::string color_scale(const ReportPicture& picture) {
   if (picture.high.empty()) return {};
   std::string text = "<span class=\"scale\">" + escaped(picture.low) + "<i style=\"background:linear-gradient(90deg";
   constexpr int kStops = 8;
@@ -69,7 +69,7 @@ std::string gallery(std::span<const ReportPicture> pictures, std::span<const std
   std::string text;
   if (!pictures.empty()) text += "<div class=\"grid\">\n";
   for (const ReportPicture& picture : pictures) {
-    text += picture_figure(picture.title, picture.png, escaped(picture.title) + colour_scale(picture));
+    text += picture_figure(picture.title, picture.png, escaped(picture.title) + color_scale(picture));
   }
   if (!pictures.empty()) text += "</div>\n";
   for (const std::string& note : notes) text += "<p class=\"soft\">" + escaped(note) + "</p>\n";
@@ -171,9 +171,9 @@ std::string quality(const Json& report) {
 std::string worst_cells(const Json& report) {
   std::string rows;
   for (const Json& cell : part(report, "quality").value("worst_cells", Json::array())) {
-    rows += row({words(cell.at("cell")), words(cell.at("scaled_jacobian")), place(cell.at("centre"))});
+    rows += row({words(cell.at("cell")), words(cell.at("scaled_jacobian")), place(cell.at("center"))});
   }
-  return rows.empty() ? "" : table({"cell", "scaled Jacobian", "centre"}, rows);
+  return rows.empty() ? "" : table({"cell", "scaled Jacobian", "center"}, rows);
 }
 
 std::string thicknesses(const Json& report) {

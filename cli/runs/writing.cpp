@@ -61,7 +61,7 @@ void write_polygons(const Output& output, const PolygonMesh& surface, const Feat
   } else {
     const SurfaceSceneOptions scene = scene_options(output, options);
     write_usd(output.path, surface, tags,
-              {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis, .tets = tets});
+              {.meters_per_unit = scene.meters_per_unit, .up_axis = scene.up_axis, .tets = tets});
   }
   require_written(output.path, surface);
 }
@@ -171,7 +171,7 @@ SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& op
                             .max_chord_percent = options.chord_percent,
                             .wireframe = !options.no_wireframe,
                             .quantize = options.quantize,
-                            .metres_per_unit = options.metres_per_unit,
+                            .meters_per_unit = options.meters_per_unit,
                             .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
                             .source = as_utf8(options.source.filename().string())};
   for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));

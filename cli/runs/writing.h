@@ -20,7 +20,7 @@ namespace subvol::cli {
 /// How surfaces for DCC tools are written.
 struct WritingOptions {
   double chord_percent = 0.005;   ///< largest chord error of a tessellation, in percent of its bounding box's diagonal
-  double metres_per_unit = 1;
+  double meters_per_unit = 1;
   std::string up_axis = "y";
   std::filesystem::path source;   ///< file that the result was made from, stored in the output
   Json options = Json::object();  ///< options in force, stored in the output

@@ -156,7 +156,7 @@ std::vector<std::string> warnings_of_quality(double aim, const MeshCheck& found)
   const QualityReport& quality = *found.quality;
   if (quality.min_scaled_jacobian >= aim - kReached) return {};
   const auto poor = std::ranges::count_if(quality.cell_minima, [&](double least) { return least < aim; });
-  const Vec3& place = quality.worst_cells.front().centre;
+  const Vec3& place = quality.worst_cells.front().center;
   return {formatted(
       "the quality of %.2f that was aimed at is missed by %zu of %zu cells: the least scaled Jacobian is %.3f, "
       "at (%.6g, %.6g, %.6g)",

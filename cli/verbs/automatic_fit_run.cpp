@@ -46,7 +46,7 @@ class AutomaticFitRun : public CageRun {
   void write();
   void check();
   Json report() const;
-  void summarise() const;
+  void summarize() const;
   bool has_cage() const { return result_.cage.num_cells() > 0; }
 
   const AutomaticFitArguments& arguments_;
@@ -154,7 +154,7 @@ Json AutomaticFitRun::report() const {
   return json;
 }
 
-void AutomaticFitRun::summarise() const {
+void AutomaticFitRun::summarize() const {
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
             << to_text(mesh_check_);
   if (has_cage()) std::cerr << to_text(limit_, mesh_check_.target_diagonal);
@@ -174,7 +174,7 @@ std::optional<int> AutomaticFitRun::run() {
   timed("write", &AutomaticFitRun::write);
   timed("check", &AutomaticFitRun::check);
   write_report(report(), seconds_json(result_.report));
-  if (!run_.quiet) summarise();
+  if (!run_.quiet) summarize();
   require_outputs();
   return status(result_.report, mesh_check_.valid());
 }

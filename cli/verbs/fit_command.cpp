@@ -104,7 +104,7 @@ class FitRun : public CageRun {
   void write();
   void check();
   Json report() const;
-  void summarise() const;
+  void summarize() const;
 
   const FitArguments& arguments_;
   Target target_;
@@ -227,7 +227,7 @@ Json FitRun::report() const {
   return json;
 }
 
-void FitRun::summarise() const {
+void FitRun::summarize() const {
   const FitReport& report = result_.report;
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
             << to_text(mesh_check_) << to_text(limit_, mesh_check_.target_diagonal);
@@ -244,7 +244,7 @@ int FitRun::run() {
   timed("write", &FitRun::write);
   timed("check", &FitRun::check);
   write_report(report(), seconds_json(result_.report));
-  if (!arguments_.run.quiet) summarise();
+  if (!arguments_.run.quiet) summarize();
   require_outputs();
   return status(result_.report, mesh_check_.valid());
 }
@@ -426,7 +426,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--solver", arguments.solver, "How energies are minimised")
+  verb.add_option("--solver", arguments.solver, "How energies are minimized")
       ->check(CLI::IsMember({"newton", "lbfgs"}))
       ->type_name("newton|lbfgs")
       ->capture_default_str()

@@ -81,7 +81,7 @@ Json CurvedOptimizeRun::report() const {
   return json;
 }
 
-void CurvedOptimizeRun::summarise() const {
+void CurvedOptimizeRun::summarize() const {
   std::cerr << to_string(fit_.stop_reason) << ": " << fit_.explanation << '\n'
             << "before: " << before_.certificate.not_certified.size() << " cells not certified, scaled Jacobian min "
             << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
@@ -95,7 +95,7 @@ int CurvedOptimizeRun::run() {
   timed("write", &CurvedOptimizeRun::write);
   timed("check", &CurvedOptimizeRun::check);
   write_report(report());
-  if (!arguments_.run.quiet) summarise();
+  if (!arguments_.run.quiet) summarize();
   require_outputs();
   return status(fit_, mesh_check_.valid());
 }

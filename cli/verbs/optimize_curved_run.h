@@ -28,7 +28,7 @@ class CurvedOptimizeRun : public LongRun {
   void write();
   void check();
   Json report() const;
-  void summarise() const;
+  void summarize() const;
 
   const OptimizeArguments& arguments_;
   HighOrderFile file_;

@@ -65,7 +65,7 @@ class OptimizeRun : public LongRun {
   void write();
   void check();
   Json report() const;
-  void summarise() const;
+  void summarize() const;
 
   const OptimizeArguments& arguments_;
   std::optional<HighOrderFile> curved_;  ///< the mesh, if its cells are curved: then `CurvedOptimizeRun` goes on
@@ -148,7 +148,7 @@ Json OptimizeRun::report() const {
   return json;
 }
 
-void OptimizeRun::summarise() const {
+void OptimizeRun::summarize() const {
   constexpr std::size_t kMostNamed = 10;
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
             << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min "
@@ -173,7 +173,7 @@ int OptimizeRun::run() {
   timed("write", &OptimizeRun::write);
   timed("check", &OptimizeRun::check);
   write_report(report());
-  if (!arguments_.run.quiet) summarise();
+  if (!arguments_.run.quiet) summarize();
   require_outputs();
   return status(result_.report, mesh_check_.valid());
 }

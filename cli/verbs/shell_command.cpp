@@ -68,7 +68,7 @@ class ShellRun : public LongRun {
   void check();
   void check_subdivided();
   Json report() const;
-  void summarise() const;
+  void summarize() const;
   std::vector<double> thickness_from_file() const;
   std::vector<double> thickness_from_attribute() const;
 
@@ -265,7 +265,7 @@ Json ShellRun::report() const {
   return json;
 }
 
-void ShellRun::summarise() const {
+void ShellRun::summarize() const {
   const FitReport& report = result_.report;
   std::fprintf(stderr, "%s: %s\n", to_string(report.stop_reason), report.explanation.c_str());
   std::fprintf(stderr, "cells               %zu in %d layer(s), %zu vertices\n", result_.mesh.num_cells(),
@@ -304,7 +304,7 @@ int ShellRun::run() {
   timed("check", &ShellRun::check);
   timed("subdivide", &ShellRun::check_subdivided);
   write_report(report(), seconds_json(result_.report));
-  if (!arguments_.run.quiet) summarise();
+  if (!arguments_.run.quiet) summarize();
   require_outputs();
   const int of_shell = status(result_.report, failures_.none() && (!linear_ || linear_->valid()));
   return of_shell == kDone ? polynomial_cells_status(polynomials_) : of_shell;
@@ -353,7 +353,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->capture_default_str();
   verb.add_flag("--free-surface", shell.free_surface,
                 "Let the surface's vertices slide along it for the cells' sake; its border and creases stay");
-  verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimisation");
+  verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimization");
   verb.add_option("--crease-angle", arguments.crease_angle_degrees,
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))

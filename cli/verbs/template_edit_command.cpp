@@ -249,7 +249,7 @@ void add_choice(CLI::App& verb, EditArguments& arguments) {
       ->type_name("SURFACE");
   verb.add_option("--share", arguments.share, "By at least this share of their volume")
       ->check(number_in(1e-6, 1.0))->type_name("SHARE")->capture_default_str();
-  add_box(verb, arguments, "Cells whose centre lies in a box");
+  add_box(verb, arguments, "Cells whose center lies in a box");
   add_cell_list(verb, arguments, "These cells, numbered from 0");
 }
 

@@ -180,9 +180,9 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->type_name("PERCENT")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--unit", options.metres_per_unit, "Length of the mesh's unit")
+  verb.add_option("--unit", options.meters_per_unit, "Length of the mesh's unit")
       ->check(number_in(1e-12, 1e12))
-      ->type_name("METRES")
+      ->type_name("METERS")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--up", options.up_axis, "Axis of the mesh that points up")

@@ -17,8 +17,8 @@ export function make(tag, properties = {}, ...children) {
 let last = 0;
 const new_id = () => `subvol-${++last}`;
 
-/// A labelled control. Each has `show(value)`, which sets it without telling.
-function labelled(text, input, output) {
+/// A labeled control. Each has `show(value)`, which sets it without telling.
+function labeled(text, input, output) {
   input.id = new_id();
   const row = make("div", { class: "row" }, make("label", { htmlFor: input.id }, text), input, output);
   return row;
@@ -27,7 +27,7 @@ function labelled(text, input, output) {
 export function slider(text, { min, max, step }, change, format = (x) => String(x)) {
   const input = make("input", { type: "range", min, max, step }),
     output = make("output");
-  const row = labelled(text, input, output);
+  const row = labeled(text, input, output);
   input.addEventListener("input", () => {
     output.textContent = format(Number(input.value));
     change(Number(input.value));
@@ -50,7 +50,7 @@ export function check(text, change) {
 
 export function choice(text, options, change) {
   const input = make("select"),
-    row = labelled(text, input);
+    row = labeled(text, input);
   row.fill = (entries) => input.replaceChildren(...entries.map(([value, label]) => make("option", { value }, label)));
   row.fill(options);
   input.addEventListener("change", () => change(input.value));
@@ -60,7 +60,7 @@ export function choice(text, options, change) {
 
 export function number(text, change) {
   const input = make("input", { type: "number", step: "any" }),
-    row = labelled(text, input);
+    row = labeled(text, input);
   input.addEventListener("change", () => input.value !== "" && change(Number(input.value)));
   row.show = (value) => document.activeElement !== input && (input.value = Number(value.toPrecision(5)));
   return row;

@@ -186,7 +186,7 @@ bool HexBoxes::is_hopeless(Box& box) { return !has_coefficients(box) && choose_m
 
 double HexBoxes::choose_models(Box& box) {
   const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
-  box.modelled_levels = box.levels, box.modelled_index = box.index;
+  box.modeled_levels = box.levels, box.modeled_index = box.index;
   box.halved = 0;
   double sum = 0;
   for (int d = 0; d < 3; ++d) {
@@ -259,7 +259,7 @@ std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
   for (int half = 0; half < 2; ++half) {
     Box& child = result[half];
     child.levels = box.levels, child.index = box.index, child.tiers = box.tiers;
-    child.modelled_levels = box.modelled_levels, child.modelled_index = box.modelled_index;
+    child.modeled_levels = box.modeled_levels, child.modeled_index = box.modeled_index;
     child.wanted = box.wanted;
     child.near_l = box.near_l;
     child.halved = box.halved + 1;

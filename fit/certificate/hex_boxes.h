@@ -49,7 +49,7 @@ class HexBoxes {
   struct Box : HexPart {
     int level = 0;  ///< number of bisections, over all directions
     /// The box that the models are made for: this one, or an enclosing one.
-    std::array<int, 3> modelled_levels{}, modelled_index{};
+    std::array<int, 3> modeled_levels{}, modeled_index{};
     int halved = 0;     ///< number of bisections of the coefficients since then
     double wanted = -1; ///< largest error of a direction's models, relative to the mean edges; < 0: the default
     int split = 0;      ///< direction of the next bisection
@@ -127,7 +127,7 @@ class HexBoxes {
   void find_coefficients(Box& box);
   void make_weights();
   const LineError& line_error(const Box& box, int direction) {
-    const int level = box.modelled_levels[direction], zone = LineModels::zone(level, box.modelled_index[direction]);
+    const int level = box.modeled_levels[direction], zone = LineModels::zone(level, box.modeled_index[direction]);
     LineError& result = errors_[direction][level][box.tiers[direction]][zone];
     if (result.cell != cell_)
       find_line_error(contraction_.models(box, direction).level(level), zone, direction, result);

@@ -10,7 +10,7 @@ namespace subvol::internal {
 
 struct PrismMatrices::Triangle {
   /// Numbers of alpha - e_c + e_i for c = 0, 1, 2: neighbors of alpha, and of one another.
-  struct Neighbours {
+  struct Neighbors {
     int u0, v0;  ///< alpha - e_0 + e_1, + e_2
     int o1, v1;  ///< alpha - e_1 + e_0, + e_2
     int o2, u2;  ///< alpha - e_2 + e_0, + e_1
@@ -18,7 +18,7 @@ struct PrismMatrices::Triangle {
   };
   explicit Triangle(int degree);
 
-  std::vector<Neighbours> neighbours;        ///< by alpha; alpha itself if there is none, and the exponent is 0
+  std::vector<Neighbors> neighbors;          ///< by alpha; alpha itself if there is none, and the exponent is 0
   std::array<std::vector<int>, 3> edges;     ///< the alpha with alpha_c = 0
   std::array<std::size_t, 3> corners;
   int middle;
@@ -34,17 +34,22 @@ PrismMatrices::Triangle::Triangle(int degree) {
       --other[from], ++other[to];
       return index.find(other);
     };
-    neighbours.push_back({moved(0, 1), moved(0, 2), moved(1, 0), moved(1, 2), moved(2, 0), moved(2, 1),
-                          {static_cast<float>(e[0]), static_cast<float>(e[1]), static_cast<float>(e[2])}});
+    neighbors.push_back({moved(0, 1),
+                         moved(0, 2),
+                         moved(1, 0),
+                         moved(1, 2),
+                         moved(2, 0),
+                         moved(2, 1),
+                         {static_cast<float>(e[0]), static_cast<float>(e[1]), static_cast<float>(e[2])}});
     for (int c = 0; c < 3; ++c) {
       if (e[c] == 0) edges[c].push_back(n);
       if (e[c] == degree) corners[c] = static_cast<std::size_t>(n);
     }
   }
-  SimplexIndex::Exponents centre{};
-  centre[1] = centre[2] = static_cast<std::int8_t>(degree / 3);
-  centre[0] = static_cast<std::int8_t>(degree - 2 * (degree / 3));
-  middle = index.find(centre);
+  SimplexIndex::Exponents center{};
+  center[1] = center[2] = static_cast<std::int8_t>(degree / 3);
+  center[0] = static_cast<std::int8_t>(degree - 2 * (degree / 3));
+  middle = index.find(center);
 }
 
 PrismMatrices::PrismMatrices() = default;
@@ -58,7 +63,7 @@ void PrismMatrices::resize(int degree) {
   if (!triangles_[degree]) triangles_[degree] = std::make_unique<Triangle>(degree);
   triangle_ = triangles_[degree].get();
   degree_ = degree;
-  count_ = static_cast<int>(triangle_->neighbours.size());
+  count_ = static_cast<int>(triangle_->neighbors.size());
   for (int row = 0; row < 3; ++row) {
     x_[row].resize(count_);
     product_[row].resize(count_);
@@ -73,7 +78,7 @@ void PrismMatrices::load(const std::array<std::vector<Lanes>, 3>& x, std::size_t
   using Number = NumberOf<Lanes>;
   constexpr Lanes kLowW{0, 1, 2, 3, 4, 5, 6, 7}, kHighW = kWide - 1 - kLowW;
   const std::size_t n = first / kWide;
-  const Triangle::Neighbours& at = triangle_->neighbours[n];
+  const Triangle::Neighbors& at = triangle_->neighbors[n];
   const Number e0 = at.exponents[0], e1 = at.exponents[1], e2 = at.exponents[2];
   for (int row = 0; row < 3; ++row) {
     const Lanes* of = x[row].data();

@@ -155,7 +155,7 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
   if (whole && !whole_) whole_ = simplex_.part(box.part, box.vertices);
   const auto part = whole ? whole_ : simplex_.part(box.part, box.vertices);
   box.tier = choose_tier(box, *part, wanted, least_tier);
-  box.modelled = box.halvings;
+  box.modeled = box.halvings;
   if (box.tier < 0) {
     box.layers.reset();
     box.control.clear();
@@ -230,7 +230,7 @@ void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t firs
 }
 
 bool SimplexBoxes::improve(Box& box, double lowest, bool) {
-  if (simplex_.is_exact() || box.tier < 0 || box.modelled != box.halvings || box.tier + 1 >= simplex_.num_tiers() ||
+  if (simplex_.is_exact() || box.tier < 0 || box.modeled != box.halvings || box.tier + 1 >= simplex_.num_tiers() ||
       !models_matter(box, lowest))
     return false;
   const double error = by_mean_edges(lasting_error(box));
@@ -270,10 +270,10 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
   }
   ++box.halvings;
   const bool numbered = box.halvings <= simplex_.most_halvings();
-  const bool modelled =
+  const bool modeled =
       numbered && box.halvings % simplex_.halvings_between() == 0 && (box.tier < 0 || models_matter(box, lowest));
   const double wanted = std::max(wanted_error(lowest / mean_edges_.prod()),
-                                 modelled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
+                                 modeled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
   AlignedDoubles control = std::move(box.control);
   box.control.clear();
   std::array<Box, 2> result{box, std::move(box)};
@@ -282,7 +282,7 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
     result[0].part *= 2;
     result[1].part = result[0].part + 1;
   }
-  if (modelled) {
+  if (modeled) {
     for (Box& half : result) take_models(half, wanted, 0);
   } else if (result[0].tier >= 0) {
     result[1].control = control;
@@ -369,7 +369,7 @@ Mat3 SimplexBoxes::frame(const Box& box) const { return (ideal_matrix(kind_) * s
 
 double SimplexBoxes::determinant_scale(const Box& box) const { return 1 / sides(box).determinant(); }
 
-Mat3 SimplexBoxes::modelling_error(const Box& box) const {
+Mat3 SimplexBoxes::modeling_error(const Box& box) const {
   if (kind_ == CellKind::tet) return lasting_error(box);
   const LineModels::Errors& errors = line_.level(box.w_level).errors[LineModels::zone(box.w_level, box.w_index)];
   Mat3 result = Mat3::Zero();
@@ -385,12 +385,12 @@ Mat3 SimplexBoxes::modelling_error(const Box& box) const {
 
 bool SimplexBoxes::is_hopeless(const Box& box) const {
   if (box.tier < 0) return true;
-  const double shifts = by_mean_edges(modelling_error(box));
+  const double shifts = by_mean_edges(modeling_error(box));
   return shifts > kHopelessSimplexError && std::isfinite(shifts);
 }
 
 Mat3 SimplexBoxes::remainder(const Box& box) const {
-  return (1 + 1e-10) * (modelling_error(box) * sides(box).cwiseAbs() + rounding_error(box));
+  return (1 + 1e-10) * (modeling_error(box) * sides(box).cwiseAbs() + rounding_error(box));
 }
 
 Mat3 SimplexBoxes::rounding_error(const Box& box) const {

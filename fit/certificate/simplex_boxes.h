@@ -36,7 +36,7 @@ class SimplexBoxes {
     std::uint32_t part = 1;           ///< number of the simplex, as in `SimplexModels`
     int w_level = 0, w_index = 0;     ///< position along w, of a prism
     int tier = -1;                    ///< tier of the models that `control` comes from; -1: none is accurate enough
-    int modelled = 0;                 ///< bisections of the simplex that these models are made for
+    int modeled = 0;                  ///< bisections of the simplex that these models are made for
     std::shared_ptr<const std::vector<Layer>> layers;  ///< bounds and errors of these models
     AlignedDoubles control;           ///< control points: at alpha lanes_ + row num_layers_ + k
   };
@@ -99,7 +99,7 @@ class SimplexBoxes {
     return error.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
   }
   /// Errors of all models, in canonical coordinates.
-  Mat3 modelling_error(const Box& box) const;
+  Mat3 modeling_error(const Box& box) const;
   /// Rounding errors of `matrices`.
   Mat3 rounding_error(const Box& box) const;
   /// On entry, both hold the control points of the whole; on return, those of one half each.

@@ -3,7 +3,7 @@
 
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/distortion.h"
-#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularized_barrier.h"
 #include "subvol/mesh/cell_topology.h"
 
 #include <span>
@@ -123,7 +123,7 @@ struct DistortionKernel {
   Batch batches[kAtOnce];
   const DistortionKernels& kernels;
 
-  DistortionKernel(double /*regularisation*/, const DistortionKernels& chosen, double floor) : kernels(chosen) {
+  DistortionKernel(double /*regularization*/, const DistortionKernels& chosen, double floor) : kernels(chosen) {
     for (Batch& batch : batches) batch.floor = floor;
   }
   void evaluate_energy(int count) { kernels.energy(batches, count); }
@@ -138,16 +138,16 @@ struct DistortionKernel {
 };
 
 /// Evaluates the regularized barrier at one point.
-struct RegularisedKernel {
+struct RegularizedKernel {
   static constexpr int kAtOnce = 1;
-  using Batch = RegularisedBatch;
+  using Batch = RegularizedBatch;
   Batch batches[kAtOnce];
   double epsilon;
 
-  RegularisedKernel(double regularisation, const DistortionKernels&, double /*floor*/) : epsilon(regularisation) {}
-  void evaluate_energy(int /*count*/) { regularised_barrier(batches[0], epsilon); }
-  void evaluate_gradient(int /*count*/) { regularised_barrier(batches[0], epsilon); }
-  void evaluate_hessian(int /*count*/) { regularised_barrier(batches[0], epsilon); }
+  RegularizedKernel(double regularization, const DistortionKernels&, double /*floor*/) : epsilon(regularization) {}
+  void evaluate_energy(int /*count*/) { regularized_barrier(batches[0], epsilon); }
+  void evaluate_gradient(int /*count*/) { regularized_barrier(batches[0], epsilon); }
+  void evaluate_hessian(int /*count*/) { regularized_barrier(batches[0], epsilon); }
 
   /// K_ab = alpha w_a.w_b I + beta (J w_a (C w_b)^T + C w_a (J w_b)^T) + gamma C w_a (C w_b)^T for a <= b, with
   /// w_a = B^T diag(1/h) grad N_a, where B is `reference`.

@@ -7,7 +7,7 @@
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_sweep.h"
 #include "subvol/fit/energies/jacobian_hinge.h"
-#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularized_barrier.h"
 #include "subvol/fit/energies/step_limit.h"
 
 #include <Eigen/LU>
@@ -270,11 +270,11 @@ double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel
 /// Does so with the present distortion or the regularized barrier.
 template <bool kBack, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, int derivatives, const PerPoint& per_point) const {
-  const auto regularised = [&](DistortionBatch* batches, int count) {
-    derivatives < 2 ? regularised_gradient(batches, count, epsilon_) : regularised_hessian(batches, count, epsilon_);
+  const auto regularized = [&](DistortionBatch* batches, int count) {
+    derivatives < 2 ? regularized_gradient(batches, count, epsilon_) : regularized_hessian(batches, count, epsilon_);
   };
   const auto kernel = std::array{kernels_->energy, kernels_->gradient, kernels_->hessian}[derivatives];
-  return epsilon_ > 0 ? integrate_with<kBack>(nodes, regularised, per_point)
+  return epsilon_ > 0 ? integrate_with<kBack>(nodes, regularized, per_point)
                       : integrate_with<kBack>(nodes, kernel, per_point);
 }
 
@@ -467,7 +467,7 @@ std::vector<Index> HighOrderEnergy::not_certified(std::span<const Vec3> nodes) c
   return certify(*space_, nodes).not_certified;
 }
 
-void HighOrderEnergy::set_regularisation(double epsilon) {
+void HighOrderEnergy::set_regularization(double epsilon) {
   if (!(epsilon >= 0) || !std::isfinite(epsilon))
     throw InputError("HighOrderEnergy: epsilon must be 0 or positive and finite");
   epsilon_ = epsilon;

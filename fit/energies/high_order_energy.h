@@ -43,7 +43,7 @@ struct CellGroup;
 /// as 27 numbers per point (30 if stretches are coupled, 9 more with a hinge) and never assembled. The results have the
 /// same bits for any number of threads. Only one caller at a time may use an object, const functions included: they
 /// share a buffer.
-class HighOrderEnergy final : public RegularisedTerm {
+class HighOrderEnergy final : public RegularizedTerm {
  public:
   /// space  must outlive the energy.
   /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError.
@@ -72,7 +72,7 @@ class HighOrderEnergy final : public RegularisedTerm {
   /// Quadrature points per direction of each cell, including refinements by `densify`.
   std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
-  void set_regularisation(double epsilon) override;
+  void set_regularization(double epsilon) override;
   /// Multiplies the weights w_cq of the cells' points. InputError also with an emphasis, whose weights depend on nodes.
   void set_weights(std::span<const double> weights) override;
   void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const override;

@@ -92,9 +92,8 @@ struct Symmetric {
   vector[0] = third ? o[2] : second ? o[0] : d[0];
   vector[1] = third ? o[1] : second ? d[1] : o[0];
   vector[2] = third ? d[2] : second ? o[1] : o[2];
-  const Wide normalise =
-      reciprocal_square_root(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
-  for (int k = 0; k < 3; ++k) vector[k] *= normalise;
+  const Wide normalize = reciprocal_square_root(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+  for (int k = 0; k < 3; ++k) vector[k] *= normalize;
 }
 
 /// Finds two vectors that complete n, |n| = 1, to an orthonormal basis.         Duff et al., JCGT 6(1), 2017

@@ -251,17 +251,17 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
 }
 
 double VolumeEnergy::value(std::span<const Vec3> nodes) const {
-  return epsilon_ > 0 ? value_of<RegularisedKernel>(nodes) : value_of<DistortionKernel>(nodes);
+  return epsilon_ > 0 ? value_of<RegularizedKernel>(nodes) : value_of<DistortionKernel>(nodes);
 }
 
 double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
-  return epsilon_ > 0 ? gradient_of<RegularisedKernel>(nodes, scale, gradient)
+  return epsilon_ > 0 ? gradient_of<RegularizedKernel>(nodes, scale, gradient)
                       : gradient_of<DistortionKernel>(nodes, scale, gradient);
 }
 
 double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
                                  BlockSparse& hessian) const {
-  return epsilon_ > 0 ? hessian_of<RegularisedKernel>(nodes, scale, gradient, hessian)
+  return epsilon_ > 0 ? hessian_of<RegularizedKernel>(nodes, scale, gradient, hessian)
                       : hessian_of<DistortionKernel>(nodes, scale, gradient, hessian);
 }
 
@@ -270,7 +270,7 @@ void VolumeEnergy::set_distortion(Distortion distortion, double floor) {
   floor_ = floor;
 }
 
-void VolumeEnergy::set_regularisation(double epsilon) {
+void VolumeEnergy::set_regularization(double epsilon) {
   if (!(epsilon >= 0) || !std::isfinite(epsilon))
     throw InputError("VolumeEnergy: epsilon must be 0 or positive and finite");
   epsilon_ = epsilon;

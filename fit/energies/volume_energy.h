@@ -26,7 +26,7 @@ namespace subvol::internal {
 /// Cells run in parallel color by color (no two cells of one color share a vertex), those of a color in fixed order:
 /// the results have the same bits for any number of threads. The evaluations allocate only one partial sum per 8 cells,
 /// and `add_gradient` a copy of the gradient.
-class VolumeEnergy final : public RegularisedTerm {
+class VolumeEnergy final : public RegularizedTerm {
  public:
   /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices that share a cell
   ///       than an Index can number (a hex mesh of about 8e7 vertices).
@@ -52,7 +52,7 @@ class VolumeEnergy final : public RegularisedTerm {
   /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  void set_regularisation(double epsilon) override;
+  void set_regularization(double epsilon) override;
   /// Sets w_c.
   void set_weights(std::span<const double> weights) override;
   void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const override;

@@ -69,13 +69,13 @@ class VolumeTerm {
 };
 
 /// A volume term that can also be minimized from inverted cells. With a regularization epsilon > 0 its density is that
-/// of `regularised_barrier.h`, which is finite everywhere, so that minimizing it untangles the cells. Steps are then
+/// of `regularized_barrier.h`, which is finite everywhere, so that minimizing it untangles the cells. Steps are then
 /// not limited, and `uncertified` returns nothing.
-class RegularisedTerm : public VolumeTerm {
+class RegularizedTerm : public VolumeTerm {
  public:
   /// epsilon  0 (initially): the distortion's own barrier; > 0: the regularized one. InputError: negative or not
   ///          finite.
-  virtual void set_regularisation(double epsilon) = 0;
+  virtual void set_regularization(double epsilon) = 0;
   /// Sets the weights of the cells; only ratios matter. InputError: another number of weights, or a weight that is not
   /// positive and finite.
   virtual void set_weights(std::span<const double> weights) = 0;

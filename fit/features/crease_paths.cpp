@@ -109,7 +109,7 @@ class PathFinder {
       near.clear();
       tree.gather({&ball, 1}, sites.size(), near);
       for (Index place : near) {
-        const double distance = (tree.position(place) - ball.centre).norm();
+        const double distance = (tree.position(place) - ball.center).norm();
         if (distance < reach) pairs.push_back({distance, corner, graph_.vertices[tree.site(place)]});
       }
     }

@@ -41,14 +41,14 @@ class CurveSearch {
   /// Looks for a path of a curve that touches nothing occupied but its corners.
   std::optional<Found> find(Index c, const Occupied& occupied);
 
-  /// A path along a part of an open curve, between two places given by arc length.
+  /// A path along a part of a curve, between two places given by arc length, as for `points_between`.
   struct FoundPart {
     std::vector<Index> path;
     double from, to;
   };
-  /// Looks for a path along an open curve that may leave out some of it at its ends, as little as possible: at most 6 h
-  /// at each, and half of the curve. It is at least 3 h long, and ends at any free vertex where it leaves something out
-  /// or where a corner has no vertex.
+  /// Looks for a path along a curve that may leave out some of it, as little as possible: at its ends, at most 6 h at
+  /// each, or in one place, at most 12 h, if it is closed; and at most half of the curve. The path is at least 3 h
+  /// long, and ends at any free vertex where it leaves something out or where a corner has no vertex.
   std::optional<FoundPart> find_part(Index c, const Occupied& occupied);
 
   /// Looks for paths of an open curve between two vertices that may stray from it by up to `most`, in units of h.
@@ -91,6 +91,7 @@ class CurveSearch {
   std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied,
                              std::span<const Index> allowed = {}) const;
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied);
+  std::vector<std::pair<double, double>> parts_to_try(Index c) const;
   bool is_cancelled() const { return cancelled_ && cancelled_(); }
   std::optional<Found> judged(std::vector<Index> path, Index c, std::span<const Vec3> curve, double most) const;
 

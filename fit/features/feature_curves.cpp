@@ -153,6 +153,12 @@ std::vector<std::array<Index, 2>> group_borders(const TriangleMesh& mesh, const 
 
 double FeatureCurve::length() const { return polyline_length(points); }
 
+std::vector<Vec3> points_between(const FeatureCurve& curve, double from, double to) {
+  std::vector<Vec3> points = curve.points;
+  if (curve.closed()) points.insert(points.end(), curve.points.begin() + 1, curve.points.end());
+  return ArcLength(points).part(from, to);
+}
+
 bool FeatureCurves::is_corner(Index vertex) const { return std::ranges::binary_search(corners, vertex); }
 
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,

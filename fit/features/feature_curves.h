@@ -21,6 +21,10 @@ struct FeatureCurve {
   double length() const;
 };
 
+/// Returns the points of a curve from one place to another, given by arc length: 0 <= from <= to <= length. On a closed
+/// curve, `to` may be up to from + length.
+std::vector<Vec3> points_between(const FeatureCurve& curve, double from, double to);
+
 /// The sharp edges of a surface, as curves between the places where they meet, bend or end.
 struct FeatureCurves {
   std::vector<FeatureCurve> curves;

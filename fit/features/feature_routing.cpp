@@ -107,7 +107,7 @@ class Router {
     negotiate();
   }
 
-  /// Finds paths along parts of the open curves that are lost, the longest first.
+  /// Finds paths along parts of the curves that are lost, the longest first.
   void follow_parts() {
     Occupied occupied = occupied_by_best();
     std::vector<Index> lost = lost_by_length();
@@ -399,11 +399,18 @@ class Router {
   /// Returns what the path of a part leaves out.
   UnfollowedCurve left_out(const FollowedPart& part) const {
     UnfollowedCurve lost = *std::ranges::find(lost_, part.curve, &UnfollowedCurve::curve);
-    const ArcLength arc(curves_[part.curve].points);
-    const bool is_front = part.from > arc.length() - part.to;
-    lost.points = is_front ? arc.part(0, part.from) : arc.part(part.to, arc.length());
-    lost.length = arc.length() - (part.to - part.from);
-    lost.place = arc.at(is_front ? part.from / 2 : (part.to + arc.length()) / 2);
+    const FeatureCurve& curve = curves_[part.curve];
+    const double length = curve.length();
+    lost.length = length - (part.to - part.from);
+    if (curve.closed()) {
+      const double from = std::fmod(part.to, length);
+      lost.points = points_between(curve, from, from + lost.length);
+    } else {
+      const bool is_front = part.from > length - part.to;
+      lost.points = is_front ? points_between(curve, 0, part.from) : points_between(curve, part.to, length);
+    }
+    const ArcLength arc(lost.points);
+    lost.place = arc.at(arc.length() / 2);
     return lost;
   }
 

@@ -19,11 +19,11 @@ struct UnfollowedCurve {
   Index curve;
   NotFollowed reason;
   Vec3 place;                ///< for a report: the corner that is at fault, or the middle of `points`
-  std::vector<Vec3> points;  ///< the curve, or the longer of the ends that its path leaves out
+  std::vector<Vec3> points;  ///< the curve, or the longest of the pieces that its path leaves out
   double length;             ///< of the curve, or of all that is left out
 };
 
-/// The part of an open curve that a path follows, between two places given by arc length.
+/// The part of a curve that a path follows, from one place to another (`points_between`).
 struct FollowedPart {
   Index curve;
   double from, to;
@@ -90,9 +90,9 @@ struct FeatureRouting {
 /// If some are lost then, all is done again with corners moved out of the way: vertices of corners on the path of
 /// another curve that finds no other, the longest curves first; a corner that cannot move shares the vertex of the
 /// curve's end if both belong to one cluster (`corner_clusters`). It is done once more with a shared vertex for each
-/// cluster at the ends of lost curves. The greatest length counts. Open curves that are still lost are followed in
-/// part: the path may leave out up to 6 h at each end and half of the curve, and it must be 3 h long. With `on_sheets`,
-/// there are no such parts.
+/// cluster at the ends of lost curves. The greatest length counts. Curves that are still lost are followed in part:
+/// the path may leave out up to 6 h at each end, of a closed curve up to 12 h in one place, and half of the curve; it
+/// must be 3 h long. With `on_sheets`, there are no such parts.
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.

@@ -81,17 +81,17 @@ class FacetGrower {
   }
 
   FacetPlane fitted_plane(const std::vector<Index>& members) const {
-    Vec3 normal = Vec3::Zero(), centre = Vec3::Zero();
+    Vec3 normal = Vec3::Zero(), center = Vec3::Zero();
     double area = 0;
     for (const Index t : members) {
       const Vec3 vector = doubled_area_vector(mesh_, mesh_.triangles[t]);
       const auto& [a, b, c] = mesh_.triangles[t];
       normal += vector;
       area += vector.norm();
-      centre += vector.norm() / 3 * (mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]);
+      center += vector.norm() / 3 * (mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]);
     }
     normal.normalize();
-    return {normal, normal.dot(centre) / area};
+    return {normal, normal.dot(center) / area};
   }
 
   const TriangleMesh& mesh_;

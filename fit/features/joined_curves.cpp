@@ -60,7 +60,8 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
   };
   for (const FollowedPart& part : routing.parts) {
     FeatureCurve& curve = result.curves[part.curve];
-    curve.points = ArcLength(features.curves.curves[part.curve].points).part(part.from, part.to);
+    curve.points = points_between(features.curves.curves[part.curve], part.from, part.to);
+    if (curve.closed()) curve.vertices.pop_back();  // the part is open
     number_vertices(curve);
   }
   for (Index c : routing.joined) {

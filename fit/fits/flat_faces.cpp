@@ -31,16 +31,16 @@ using Closest = std::function<ClosestPoint::Hit(const Vec3& point, Index group, 
 /// Returns the facet that a face lies on, or kNoIndex.
 Index facet_of_face(std::span<const Index> corners, Index group, const VolumeMesh& mesh, const Closest& closest,
                     const FlatFacets& facets) {
-  Vec3 centre = Vec3::Zero();
-  for (const Index v : corners) centre += mesh.positions[v] / static_cast<double>(corners.size());
-  const ClosestPoint::Hit hit = closest(centre, group, kNoIndex);
+  Vec3 center = Vec3::Zero();
+  for (const Index v : corners) center += mesh.positions[v] / static_cast<double>(corners.size());
+  const ClosestPoint::Hit hit = closest(center, group, kNoIndex);
   const Index facet = hit.triangle == kNoIndex ? kNoIndex : facets.of_triangle[hit.triangle];
   if (facet == kNoIndex) return kNoIndex;
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec3 &p = mesh.positions[corners[i]], &next = mesh.positions[corners[(i + 1) % corners.size()]];
-    normal += (p - centre).cross(next - centre);
-    const ClosestPoint::Hit halfway = closest(0.5 * (centre + p), group, hit.triangle);
+    normal += (p - center).cross(next - center);
+    const ClosestPoint::Hit halfway = closest(0.5 * (center + p), group, hit.triangle);
     if (halfway.triangle == kNoIndex || facets.of_triangle[halfway.triangle] != facet) return kNoIndex;
   }
   return std::abs(normal.normalized().dot(facets.planes[facet].normal)) >= kSameDirection ? facet : kNoIndex;

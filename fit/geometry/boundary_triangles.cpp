@@ -62,11 +62,11 @@ TriangleMesh refined_triangles(const PolygonMesh& polygons, std::vector<Index>* 
       for (std::size_t k = 0; k < 3; ++k) result.triangles.push_back({corner(k), middle(k), middle(k + 2)});
       result.triangles.push_back({middle(0), middle(1), middle(2)});
     } else {
-      const Index centre = static_cast<Index>(result.positions.size());
+      const Index center = static_cast<Index>(result.positions.size());
       result.positions.push_back(sum / static_cast<double>(size));
       for (std::size_t k = 0; k < size; ++k) {
-        result.triangles.push_back({corner(k), middle(k), centre});
-        result.triangles.push_back({middle(k), corner(k + 1), centre});
+        result.triangles.push_back({corner(k), middle(k), center});
+        result.triangles.push_back({middle(k), corner(k + 1), center});
       }
     }
     if (polygon_of_triangle)
@@ -90,9 +90,9 @@ TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* poly
     } else {
       Vec3 sum = Vec3::Zero();
       for (std::size_t k = 0; k < size; ++k) sum += polygons.positions[corner(k)];
-      const auto centre = static_cast<Index>(result.positions.size());
+      const auto center = static_cast<Index>(result.positions.size());
       result.positions.push_back(sum / static_cast<double>(size));
-      for (std::size_t k = 0; k < size; ++k) result.triangles.push_back({corner(k), corner(k + 1), centre});
+      for (std::size_t k = 0; k < size; ++k) result.triangles.push_back({corner(k), corner(k + 1), center});
     }
     if (polygon_of_triangle)
       polygon_of_triangle->insert(polygon_of_triangle->end(), result.triangles.size() - before, static_cast<Index>(f));

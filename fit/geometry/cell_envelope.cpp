@@ -89,7 +89,7 @@ CellEnvelope::Cut CellEnvelope::find_cell(int function, std::span<const Barycent
   std::copy(whole.begin(), whole.end(), polygon_->at.begin());
   const Barycentric own = values(function);
   for (int k = 0; k < known_[function].count; ++k) {
-    const Cut result = cut(function, known_[function].neighbours[k]);
+    const Cut result = cut(function, known_[function].neighbors[k]);
     if (result == Cut::empty || result == Cut::tie) return result;
   }
   for (std::uint32_t open; (open = ~polygon_->checked & ((1u << polygon_->size) - 1)) != 0;) {
@@ -101,16 +101,16 @@ CellEnvelope::Cut CellEnvelope::find_cell(int function, std::span<const Barycent
       continue;
     }
     const int other = lowest_function(at, lowest_lane(low));
-    note_neighbours(function, other);
+    note_neighbors(function, other);
     const Cut result = cut(function, other);
     if (result == Cut::empty || result == Cut::tie) return result;
   }
   return Cut::cut;
 }
 
-void CellEnvelope::note_neighbours(int cell, int found) {
+void CellEnvelope::note_neighbors(int cell, int found) {
   Known& known = known_[found];
-  if (known.count < kMaxKnown) known.neighbours[known.count++] = cell;
+  if (known.count < kMaxKnown) known.neighbors[known.count++] = cell;
   if (known.queued) return;
   known.queued = true;
   queue_.push_back(found);

@@ -52,7 +52,7 @@ class CellEnvelope {
   struct Known {
     int count = 0;
     bool queued = false;
-    std::array<int, kMaxKnown> neighbours;
+    std::array<int, kMaxKnown> neighbors;
   };
   using Block = std::array<Wide, 3>;
   enum class Cut { untouched, cut, empty, tie };
@@ -62,7 +62,7 @@ class CellEnvelope {
   int lowest_function(const Barycentric& at, double value) const;
   Cut cut(int inside, int outside);
   Cut find_cell(int function, std::span<const Barycentric> whole);
-  void note_neighbours(int cell, int found);
+  void note_neighbors(int cell, int found);
 
   double noise_ = 0;
   std::vector<Block> blocks_;

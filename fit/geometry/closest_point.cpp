@@ -94,13 +94,13 @@ void ClosestPoint::partition(std::vector<Item>& items, Range range) {
     const auto first = items.begin() + lower.begin, last = items.begin() + upper.end;
     Vec3 low = Vec3::Constant(kInfinity), high = -low;
     for (auto i = first; i != last; ++i) {
-      low = low.cwiseMin(i->centre);
-      high = high.cwiseMax(i->centre);
+      low = low.cwiseMin(i->center);
+      high = high.cwiseMax(i->center);
     }
     int axis;
     (high - low).maxCoeff(&axis);
     std::nth_element(first, items.begin() + upper.begin, last, [axis](const Item& a, const Item& b) {
-      return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis] : a.triangle < b.triangle;
+      return a.center[axis] != b.center[axis] ? a.center[axis] < b.center[axis] : a.triangle < b.triangle;
     });
   });
   for (int i = 0; i < parts.count; ++i) {

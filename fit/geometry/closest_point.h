@@ -74,7 +74,7 @@ class ClosestPoint {
     int count = 1;
   };
   struct Item {
-    Vec3 centre;
+    Vec3 center;
     Index triangle;
   };
 

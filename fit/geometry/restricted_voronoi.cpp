@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kChunk = 256;
 constexpr double kMaxLooseness = 2;  // of the tree's boxes; beyond it, the tree is built anew
 
-Vec3 box_centre(std::span<const Vec3> points) {
+Vec3 box_center(std::span<const Vec3> points) {
   Vec3 low = points[0], high = points[0];
   for (const Vec3& p : points) {
     low = low.cwiseMin(p);
@@ -29,7 +29,7 @@ Vec3 box_centre(std::span<const Vec3> points) {
 
 /// Computes the positions relative to a center and the nearest site of each. Each search starts from the site before,
 /// which does not change the result.
-void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved,
+void locate(std::span<const Vec3> positions, const Vec3& center, const SiteTree& tree, std::vector<Vec3>& moved,
             std::vector<Index>& nearest) {
   moved.resize(positions.size());
   nearest.resize(positions.size());
@@ -38,7 +38,7 @@ void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree&
   for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
     Index before = kNoIndex;
     for (std::size_t i = chunk * kChunk; i < std::min(positions.size(), (chunk + 1) * kChunk); ++i) {
-      moved[i] = positions[i] - centre;
+      moved[i] = positions[i] - center;
       before = before == kNoIndex ? tree.nearest(moved[i]).place
                                   : tree.nearest(moved[i], (tree.position(before) - moved[i]).squaredNorm()).place;
       nearest[i] = before;
@@ -61,15 +61,15 @@ void RestrictedVoronoi::update_sites(std::span<const Vec3> sites) {
 void RestrictedVoronoi::take_sites(std::span<const Vec3> sites) {
   for (const Vec3& s : sites)
     if (!s.allFinite()) throw InputError("RestrictedVoronoi: sites must be finite");
-  centre_ = box_centre(sites);
+  center_ = box_center(sites);
   std::vector<Vec3> moved(sites.size());
-  for (std::size_t i = 0; i < sites.size(); ++i) moved[i] = sites[i] - centre_;
+  for (std::size_t i = 0; i < sites.size(); ++i) moved[i] = sites[i] - center_;
   if (num_sites() == moved.size()) tree_.refit(moved);
   if (num_sites() != moved.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(moved);
 }
 
 Index RestrictedVoronoi::nearest_site(const Vec3& point) const {
-  const Index place = tree_.nearest(point - centre_).place;
+  const Index place = tree_.nearest(point - center_).place;
   return place == kNoIndex ? kNoIndex : tree_.site(place);
 }
 
@@ -81,7 +81,7 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
         throw InputError("RestrictedVoronoi::compute: triangle corners must be in [0, positions.size())");
   std::vector<Vec3> moved;
   std::vector<Index> nearest;
-  locate(positions, centre_, tree_, moved, nearest);
+  locate(positions, center_, tree_, moved, nearest);
 
   const std::size_t num_chunks = (triangles.size() + kChunk - 1) / kChunk;
   struct Segment {

@@ -69,7 +69,7 @@ class RestrictedVoronoi {
  private:
   void take_sites(std::span<const Vec3> sites);
 
-  Vec3 centre_ = Vec3::Zero();  ///< origin of all coordinates in use, so that a far origin costs no digits
+  Vec3 center_ = Vec3::Zero();  ///< origin of all coordinates in use, so that a far origin costs no digits
   SiteTree tree_;
 };
 

@@ -188,9 +188,9 @@ bool SiteTree::gather(std::span<const Ball> balls, std::size_t max_count, std::v
     unsigned lanes = 0;
     for (const Ball& ball : balls) {
       if (leaf)
-        leaf_distances(leaves_[entry.number], ball.centre, d);
+        leaf_distances(leaves_[entry.number], ball.center, d);
       else
-        box_distances(boxes_[level_offsets_[entry.level] + entry.number], ball.centre, d);
+        box_distances(boxes_[level_offsets_[entry.level] + entry.number], ball.center, d);
       lanes |= lanes_within(d, leaf ? ball.squared_radius : ball.squared_radius * kSlack);
     }
     if (leaf) count += static_cast<std::size_t>(std::popcount(lanes));

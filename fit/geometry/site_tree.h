@@ -24,7 +24,7 @@ class SiteTree {
     double squared_distance = std::numeric_limits<double>::infinity();
   };
   struct Ball {
-    Vec3 centre;
+    Vec3 center;
     double squared_radius;
   };
 

@@ -135,12 +135,12 @@ void TriangleCutter::split(int c, int b) {
   height_.resize(n);
   for (std::size_t i = 0; i < n; ++i) height_[i] = height(polygon_[i]);
   // In each half, corners labeled with the other half's site are at least as near to this half's own and get its label.
-  const auto relabelled = [](Corner corner, int other, int own) {
+  const auto relabeled = [](Corner corner, int other, int own) {
     if (corner.slot == other || corner.slot < 0) corner.slot = own;
     return corner;
   };
-  const auto in_b = [&](const Corner& corner) { return relabelled(corner, c, b); };
-  const auto in_c = [&](const Corner& corner) { return relabelled(corner, b, c); };
+  const auto in_b = [&](const Corner& corner) { return relabeled(corner, c, b); };
+  const auto in_c = [&](const Corner& corner) { return relabeled(corner, b, c); };
 
   parts_.push_back(corners_.size());
   if (*std::min_element(height_.begin(), height_.end()) >= -noise) {

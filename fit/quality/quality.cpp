@@ -282,7 +282,7 @@ void QualityReport::add_cell(double least) {
   inverted_cells += least <= 0;
 }
 
-void QualityReport::keep_worst(const std::function<Vec3(Index)>& centre) {
+void QualityReport::keep_worst(const std::function<Vec3(Index)>& center) {
   std::vector<Index> order(cell_minima.size());
   for (std::size_t c = 0; c < order.size(); ++c) order[c] = static_cast<Index>(c);
   const std::size_t count = std::min<std::size_t>(10, order.size());
@@ -290,7 +290,7 @@ void QualityReport::keep_worst(const std::function<Vec3(Index)>& centre) {
     return cell_minima[a] != cell_minima[b] ? cell_minima[a] < cell_minima[b] : a < b;
   });
   worst_cells.clear();
-  for (std::size_t i = 0; i < count; ++i) worst_cells.push_back({order[i], centre(order[i]), cell_minima[order[i]]});
+  for (std::size_t i = 0; i < count; ++i) worst_cells.push_back({order[i], center(order[i]), cell_minima[order[i]]});
 }
 
 QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction, const CellReference& reference) {

@@ -18,7 +18,7 @@ inline constexpr int kNumHistogramBins = 20;
 struct QualityReport {
   struct WorstCell {
     Index cell;    ///< from 0
-    Vec3 centre;   ///< mean of its corners
+    Vec3 center;   ///< mean of its corners
     double value;  ///< its lowest scaled Jacobian
   };
   std::size_t num_cells = 0, num_samples = 0;
@@ -35,7 +35,7 @@ struct QualityReport {
   /// Adds one cell to cell_minima, min_scaled_jacobian, histogram and inverted_cells.
   void add_cell(double least);
   /// Fills worst_cells from cell_minima.
-  void keep_worst(const std::function<Vec3(Index)>& centre);
+  void keep_worst(const std::function<Vec3(Index)>& center);
 };
 
 /// Samples the scaled Jacobian of every cell and certifies det J > 0.

@@ -105,7 +105,7 @@ MinimizerStop stop_of(std::uint64_t number) {
   for (const MinimizerStop stop : {MinimizerStop::converged, MinimizerStop::iteration_limit, MinimizerStop::no_step,
                                    MinimizerStop::cancelled, MinimizerStop::infeasible_start})
     if (number == static_cast<std::uint64_t>(stop)) return stop;
-  throw InputError("a minimisation ends in no known way");
+  throw InputError("a minimization ends in no known way");
 }
 
 int count_of(double number) {
@@ -149,7 +149,7 @@ Checkpoint read_content(std::string_view content) {
   for (std::uint64_t left = reader.number(); left > 0; --left) {
     checkpoint.stages.push_back(read_stage(reader));
     if (left > 1 && !checkpoint.stages.back().is_over())
-      throw InputError("a minimisation that is not over is followed by one");
+      throw InputError("a minimization that is not over is followed by one");
   }
   if (!reader.at_end()) throw InputError("something follows its end");
   return checkpoint;

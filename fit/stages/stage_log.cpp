@@ -9,7 +9,7 @@ const SolvedStage* StageLog::recall(const SolvedStage& begun) {
   if (recalled_ == earlier_) return nullptr;
   const SolvedStage& stage = stages_[recalled_];
   if (stage.name != begun.name || stage.start != begun.start || stage.x.size() != begun.x.size())
-    throw InputError(source_ + ": does not continue this run: its minimisation " + std::to_string(recalled_ + 1) +
+    throw InputError(source_ + ": does not continue this run: its minimization " + std::to_string(recalled_ + 1) +
                      " (" + stage.name + ") started from something else; it was made by another build or machine");
   ++recalled_;
   return &stage;

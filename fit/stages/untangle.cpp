@@ -2,7 +2,7 @@
 #include "subvol/fit/stages/untangle.h"
 
 #include "subvol/base/format.h"
-#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularized_barrier.h"
 #include "subvol/fit/stages/fit_report.h"
 
 #include <algorithm>
@@ -30,13 +30,13 @@ class TangledCells {
  public:
   TangledCells(FitProblem& problem, std::size_t num_cells)
       : problem_(problem),
-        energy_(dynamic_cast<RegularisedTerm&>(*problem.volume)),
+        energy_(dynamic_cast<RegularizedTerm&>(*problem.volume)),
         nodes_(problem.nodes.num_rows()),
         least_(num_cells),
         weights_(num_cells, 1) {}
   TangledCells(const TangledCells&) = delete;
   TangledCells& operator=(const TangledCells&) = delete;
-  ~TangledCells() { energy_.set_regularisation(0); }
+  ~TangledCells() { energy_.set_regularization(0); }
 
   /// Certifies the cells of a state and measures their determinants; returns true if every cell is certified.
   bool look(std::span<const Vec3> x) {
@@ -63,7 +63,7 @@ class TangledCells {
 
   double determinant() const { return determinant_; }
   const std::vector<Index>& uncertified() const { return uncertified_; }
-  void set_epsilon(double epsilon) { energy_.set_regularisation(epsilon); }
+  void set_epsilon(double epsilon) { energy_.set_regularization(epsilon); }
   double energy(std::span<const Vec3> x) {
     problem_.apply_nodes(x, nodes_);
     return energy_.value(nodes_);
@@ -71,7 +71,7 @@ class TangledCells {
 
  private:
   FitProblem& problem_;
-  RegularisedTerm& energy_;
+  RegularizedTerm& energy_;
   std::vector<Vec3> nodes_;
   std::vector<double> least_, weights_;
   std::vector<Index> uncertified_;

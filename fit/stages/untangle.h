@@ -21,11 +21,11 @@ struct UntangleResult {
   std::vector<Index> uncertified;  ///< cells that are not certified at the end, ascending
 };
 
-/// Minimizes E = E_S + lambda E_W with the regularized barrier (`regularised_barrier.h`) in rounds that adapt epsilon
+/// Minimizes E = E_S + lambda E_W with the regularized barrier (`regularized_barrier.h`) in rounds that adapt epsilon
 /// to the worst determinant, until every cell is certified. Cells that are positive at their quadrature points but not
 /// certified get more points; cells that still fail when a round has nearly stopped decreasing E get more weight.
 ///
-/// problem   its volume term is a RegularisedTerm of `num_cells` cells; on return, its regularization is off.
+/// problem   its volume term is a RegularizedTerm of `num_cells` cells; on return, its regularization is off.
 /// record    name, level and cells of the reported stages, one per round.
 /// x         any finite start; receives the result, certified or not.
 /// A round counts as a gain if fewer cells fail than in any round before or the worst determinant rises.

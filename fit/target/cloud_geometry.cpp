@@ -36,15 +36,15 @@ class NeighborSearch {
   ///                 large one looks at too many points. out: a good guess for points nearby, >= least > 0 even if
   ///                 points coincide.
   const std::vector<Neighbor>& operator()(Index place, double& squared_radius) {
-    const Vec3& centre = tree_.position(place);
+    const Vec3& center = tree_.position(place);
     for (;; squared_radius *= 4) {
       places_.clear();
-      const SiteTree::Ball ball{centre, squared_radius};
+      const SiteTree::Ball ball{center, squared_radius};
       tree_.gather({&ball, 1}, tree_.num_sites(), places_);
       if (places_.size() <= k_) continue;
       found_.clear();
       for (Index other : places_)
-        if (other != place) found_.push_back({(tree_.position(other) - centre).squaredNorm(), other});
+        if (other != place) found_.push_back({(tree_.position(other) - center).squaredNorm(), other});
       std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
       found_.resize(k_);
       if (found_.back().squared_distance * kSlack <= squared_radius) break;

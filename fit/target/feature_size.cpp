@@ -19,8 +19,8 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
   constexpr int kMostRounds = 30;
   double radius = most, cosine = 1;
   for (int round = 0; round < kMostRounds; ++round) {
-    const Vec3 centre = p + radius * n;
-    const ClosestPoint::Hit hit = tree.closest(centre);
+    const Vec3 center = p + radius * n;
+    const ClosestPoint::Hit hit = tree.closest(center);
     if (!(hit.distance < kTouching * radius)) break;
     const Vec3 across = hit.point - p;
     const double height = across.dot(n), squared = across.squaredNorm();

@@ -18,36 +18,36 @@ namespace subvol::internal {
 
 namespace {
 
-TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation) {
-  mesh.positions = normalisation.to_unit(std::move(mesh.positions));
+TriangleMesh normalized(TriangleMesh mesh, const Normalization& normalization) {
+  mesh.positions = normalization.to_unit(std::move(mesh.positions));
   return mesh;
 }
 
-PointCloud normalised(const PointCloud& cloud, const Normalisation& normalisation) {
-  return {normalisation.to_unit(cloud.points)};
+PointCloud normalized(const PointCloud& cloud, const Normalization& normalization) {
+  return {normalization.to_unit(cloud.points)};
 }
 
 }  // namespace
 
-Normalisation::Normalisation(const TriangleMesh& target) {
-  centre = TargetSurface::centre_of(target);
+Normalization::Normalization(const TriangleMesh& target) {
+  center = TargetSurface::center_of(target);
   diagonal = bounding_box_diagonal(target);
   if (!(diagonal > 0) || !std::isfinite(diagonal))
     throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
 }
 
-Normalisation::Normalisation(const PointCloud& target) {
+Normalization::Normalization(const PointCloud& target) {
   const TargetSurface surface(target);
-  centre = surface.centre();
+  center = surface.center();
   diagonal = surface.diagonal();
 }
 
-std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = (p - centre) / diagonal;
+std::vector<Vec3> Normalization::to_unit(std::vector<Vec3> points) const {
+  for (Vec3& p : points) p = (p - center) / diagonal;
   return points;
 }
 
-void Normalisation::take_in(VolumeMesh& mesh) const {
+void Normalization::take_in(VolumeMesh& mesh) const {
   // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of cells.
   constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
   mesh.positions = to_unit(std::move(mesh.positions));
@@ -63,16 +63,16 @@ void Normalisation::take_in(VolumeMesh& mesh) const {
         "the mesh is %.2g times the target's diagonal away from it; expected one roughly in place", distance));
 }
 
-std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = centre + diagonal * p;
+std::vector<Vec3> Normalization::from_unit(std::vector<Vec3> points) const {
+  for (Vec3& p : points) p = center + diagonal * p;
   return points;
 }
 
 FitTarget::FitTarget(const TriangleMesh& target)
-    : normalisation(target), mesh(normalised(joined_at_open_edges(target), normalisation)), tree(mesh), surface(mesh) {}
+    : normalization(target), mesh(normalized(joined_at_open_edges(target), normalization)), tree(mesh), surface(mesh) {}
 
 FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
-    : normalisation(target), surface(normalised(target, normalisation), weights) {}
+    : normalization(target), surface(normalized(target, normalization), weights) {}
 
 void FitTarget::keep_interfaces(const VolumeMesh& start) {
   if (surface.is_cloud() || has_interfaces()) return;
@@ -94,7 +94,7 @@ void FitTarget::keep_interfaces(TriangleMesh triangles, std::vector<Index> group
 
 FitTarget::FitTarget(const RegionSurface& target) : FitTarget(outer_surface(target)) {
   std::vector<Index> numbers;
-  interfaces = normalised(inner_surface(target, numbers), normalisation);
+  interfaces = normalized(inner_surface(target, numbers), normalization);
   std::vector<std::array<int, 2>> pairs;
   for (const Index t : numbers) pairs.push_back(target.pair(static_cast<std::size_t>(t)));
   std::sort(pairs.begin(), pairs.end());
@@ -106,13 +106,13 @@ FitTarget::FitTarget(const RegionSurface& target) : FitTarget(outer_surface(targ
   const auto has_area = [&](std::size_t t) {
     std::array<Vec3, 3> x;
     for (std::size_t i = 0; i < 3; ++i)
-      x[i] = (target.mesh.positions[target.mesh.triangles[t][i]] - normalisation.centre) / normalisation.diagonal;
+      x[i] = (target.mesh.positions[target.mesh.triangles[t][i]] - normalization.center) / normalization.diagonal;
     return (x[1] - x[0]).cross(x[2] - x[0]).norm() > 0;
   };
   for (const bool inner : {false, true})
     for (std::size_t t = 0; t < target.sides.size(); ++t)
       if (target.is_inner(t) == inner && has_area(t)) region_triangle.push_back(static_cast<Index>(t));
-  for (const double volume : target.volumes) region_volumes.push_back(volume / std::pow(normalisation.diagonal, 3));
+  for (const double volume : target.volumes) region_volumes.push_back(volume / std::pow(normalization.diagonal, 3));
   add_interfaces();
 }
 
@@ -198,9 +198,9 @@ StartComparison FitTarget::compare_start(const TriangleMesh& boundary) {
   std::optional<TargetSurface> outer;  // interfaces are no part of what the boundary is compared with
   if (!region_triangle.empty()) outer.emplace(mesh);
   StartComparison result{start.mean(), start.max(), describe_target(outer ? *outer : surface, boundary)};
-  const double unit = std::pow(normalisation.diagonal, 2);
+  const double unit = std::pow(normalization.diagonal, 2);
   result.target.area *= unit;
-  result.target.volume *= unit * normalisation.diagonal;
+  result.target.volume *= unit * normalization.diagonal;
   return result;
 }
 

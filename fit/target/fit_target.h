@@ -19,13 +19,13 @@ namespace subvol::internal {
 
 /// Centered coordinates in which the target's bounding box has the diagonal 1, so that results do not depend on the
 /// origin or the unit.
-struct Normalisation {
-  Vec3 centre = Vec3::Zero();
+struct Normalization {
+  Vec3 center = Vec3::Zero();
   double diagonal = 1;
 
   /// InputError: a target without extent, or with coordinates that are not finite.
-  explicit Normalisation(const TriangleMesh& target);
-  explicit Normalisation(const PointCloud& target);
+  explicit Normalization(const TriangleMesh& target);
+  explicit Normalization(const PointCloud& target);
   std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
   /// Transforms a mesh to these coordinates. InputError: the mesh is more than 1e6 times smaller or larger than the
   /// target, or more than 1e6 diagonals away from it.
@@ -38,7 +38,7 @@ inline constexpr std::size_t kLeastTargetSamples = 20000;
 
 /// The surface that a fit approximates, in normalized coordinates: lengths are shares of the target's diagonal.
 struct FitTarget {
-  Normalisation normalisation;
+  Normalization normalization;
   TriangleMesh mesh;                 ///< without triangles: the target is a cloud
   std::optional<ClosestPoint> tree;  ///< tree over the triangles; none for a cloud
   TargetSurface surface;             ///< with the samples of the last `sample`
@@ -53,7 +53,7 @@ struct FitTarget {
   std::vector<Index> region_triangle;
   std::vector<double> region_volumes;  ///< `RegionSurface::volumes` in normalized coordinates
 
-  /// InputError: as for `Normalisation`.
+  /// InputError: as for `Normalization`.
   /// Vertices of the target's open edges in the same place count as one (`joined_at_open_edges`).
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);

@@ -116,10 +116,10 @@ void TargetSurface::take_triangles(const TriangleMesh& mesh) {
   set_box(low, high);  // positions that no triangle uses are ignored
 }
 
-Vec3 TargetSurface::centre_of(const TriangleMesh& mesh) {
+Vec3 TargetSurface::center_of(const TriangleMesh& mesh) {
   TargetSurface surface;
   surface.take_triangles(mesh);
-  return surface.centre();
+  return surface.center();
 }
 
 TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options) {
@@ -157,7 +157,7 @@ TargetSurface::TargetSurface(const PointCloud& cloud, PointWeights weights) {
 void TargetSurface::set_box(const Vec3& low, const Vec3& high) {
   require_length((high - low).maxCoeff(), "target");
   diagonal_ = (high - low).norm();
-  centre_ = low + 0.5 * (high - low);
+  center_ = low + 0.5 * (high - low);
 }
 
 void TargetSurface::set_volume(double volume) {

@@ -57,7 +57,7 @@ class TargetSurface {
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
 
   /// Returns the center of the bounding box that the target made of a surface has. InputError: as the constructor.
-  static Vec3 centre_of(const TriangleMesh& mesh);
+  static Vec3 center_of(const TriangleMesh& mesh);
 
   /// True if there are only points: no triangles, nothing to integrate over.
   bool is_cloud() const { return triangles_.empty(); }
@@ -84,7 +84,7 @@ class TargetSurface {
   /// L = V / A, the length that makes the surface energy dimensionless.           Paper: Eq. 9
   double length() const { return volume_ / area_; }
   double diagonal() const { return diagonal_; }  ///< diagonal of the bounding box
-  Vec3 centre() const { return centre_; }        ///< center of the bounding box
+  Vec3 center() const { return center_; }        ///< center of the bounding box
 
   /// Points on the surface: the barycenters of the triangles or, if an edge is longer than the spacing, those of the
   /// parts that result from repeatedly halving the longest edge. For a cloud, its points.
@@ -121,7 +121,7 @@ class TargetSurface {
   std::vector<Index> sample_triangles_;
   double area_ = 0, volume_ = 0, diagonal_ = 0;
   VolumeSource volume_source_ = VolumeSource::signed_sum;
-  Vec3 centre_ = Vec3::Zero();
+  Vec3 center_ = Vec3::Zero();
 };
 
 }  // namespace subvol

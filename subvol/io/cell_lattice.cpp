@@ -85,8 +85,8 @@ void add_nested_inside_face(Lattice& out, const Part& part, const Face& face) {
 Part inner_cell(CellKind kind, const Part& part) {
   Part inner{part.corners, kind == CellKind::tet ? part.order - 4 : part.order - 2};
   for (std::size_t k = 0; k < part.corners.size(); ++k)
-    for (const int neighbour : cell_topology(kind).corner_neighbors[k])
-      inner.corners[k] += part.step(static_cast<int>(k), neighbour);
+    for (const int neighbor : cell_topology(kind).corner_neighbors[k])
+      inner.corners[k] += part.step(static_cast<int>(k), neighbor);
   return inner;
 }
 

@@ -85,7 +85,7 @@ void sort_by_number(VolumeFaceGroups& groups) {
   }
   groups.groups = std::move(sorted);
   for (GroupedFace& entry : groups.faces) entry.group = place[entry.group];
-  normalise(groups);
+  normalize(groups);
 }
 
 class MeditParser {

@@ -145,7 +145,7 @@ NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, co
   NodalMesh mesh = (is_gmsh_mesh ? parse_msh : format->parse)(path.string(), bytes, references);
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
     mesh.references.clear();
-  normalise(mesh.face_groups);
+  normalize(mesh.face_groups);
   if (mesh.max_order() > 1 && std::ranges::find(mesh.kinds, CellKind::pyramid) != mesh.kinds.end())
     throw InputError(path.string() + ": curved cells beside pyramids: " + kNoCurvedPyramids);
   return mesh;

@@ -195,7 +195,7 @@ class PlyParser {
   /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the
   /// property that subvol writes, 0 is no group.
   void add_groups() {
-    if (colors_) mesh_.face_groups = colors_->take(left_out_, "colours of faces");
+    if (colors_) mesh_.face_groups = colors_->take(left_out_, "colors of faces");
     if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
     std::vector<std::int64_t> found = labels_;
     std::sort(found.begin(), found.end());

@@ -202,7 +202,7 @@ class ObjParser {
     mesh_.positions.push_back(position);
     std::size_t more = 0;  // a single one is a weight
     while (words.next()) ++more;
-    if (more >= 3) left_out_.add("colours of vertices");
+    if (more >= 3) left_out_.add("colors of vertices");
   }
 
   void parse_face(TextScanner& words) {
@@ -254,7 +254,7 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   PolygonMesh mesh;
   LeftOut left_out;
   ColorGroups colors;
-  if (keyword->find('C') != std::string_view::npos) left_out.add("colours of vertices", num_vertices);
+  if (keyword->find('C') != std::string_view::npos) left_out.add("colors of vertices", num_vertices);
   if (keyword->find("ST") != std::string_view::npos) left_out.add("texture coordinates", num_vertices);
   mesh.positions.resize(num_vertices);
   for (Vec3& position : mesh.positions) {
@@ -273,7 +273,7 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
     mesh.face_offsets.push_back(mesh.face_vertices.size());
     colors.add_face(color_in_rest_of_line(scan));
   }
-  mesh.face_groups = colors.take(left_out, "colours of faces");
+  mesh.face_groups = colors.take(left_out, "colors of faces");
   if (const auto more = scan.next()) scan.fail("more than the counts say: " + in_quotes(*more));
   ParsedSurface parsed{std::move(mesh), {}};
   left_out.tell(parsed.warnings);

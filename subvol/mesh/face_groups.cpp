@@ -36,7 +36,7 @@ FaceKey face_key(std::span<const Index> corners) {
   return key;
 }
 
-void normalise(VolumeFaceGroups& groups) {
+void normalize(VolumeFaceGroups& groups) {
   std::sort(groups.faces.begin(), groups.faces.end());
   groups.faces.erase(std::unique(groups.faces.begin(), groups.faces.end()), groups.faces.end());
 }
@@ -63,7 +63,7 @@ VolumeFaceGroups groups_from_boundary(std::vector<Group> groups, const MeshTopol
   for (std::size_t i = 0; i < of_boundary_face.size(); ++i)
     if (of_boundary_face[i] != kNoIndex)
       result.faces.push_back({face_key(topology.face(faces[i])), of_boundary_face[i]});
-  normalise(result);
+  normalize(result);
   return result;
 }
 
@@ -80,7 +80,7 @@ VolumeFaceGroups renumbered(const VolumeFaceGroups& groups, std::span<const Inde
     }
     if (kept) result.faces.push_back({face_key({corners.data(), size}), entry.group});
   }
-  normalise(result);
+  normalize(result);
   return result;
 }
 
@@ -109,7 +109,7 @@ void append_groups(VolumeFaceGroups& groups, const VolumeFaceGroups& others, Ind
     for (Index& v : entry.face) v += v == kNoIndex ? 0 : first_vertex;
     groups.faces.push_back({entry.face, place[entry.group]});
   }
-  normalise(groups);
+  normalize(groups);
 }
 
 int free_number(std::span<const Group> groups) {

@@ -56,7 +56,7 @@ struct VolumeFaceGroups {
 };
 
 /// Sorts the faces and drops those that are there twice.
-void normalise(VolumeFaceGroups& groups);
+void normalize(VolumeFaceGroups& groups);
 
 /// Returns the first group of a face, the one with the lowest place, or kNoIndex. Cost: logarithmic.
 Index group_of(const VolumeFaceGroups& groups, std::span<const Index> corners);

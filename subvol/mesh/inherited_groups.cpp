@@ -67,7 +67,7 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
     for (auto at = first; at != smallest_around.end() && at->first == vertices->front(); ++at)
       add(corners, *vertices, at->second);
   }
-  normalise(result);
+  normalize(result);
   return result;
 }
 

@@ -82,7 +82,7 @@ void add_interface_groups(VolumeMesh& mesh) {
   for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
     mesh.face_groups.faces.push_back(
         {face_key(topology.face(interfaces.faces[i])), first + interfaces.pair_of_face[i]});
-  normalise(mesh.face_groups);
+  normalize(mesh.face_groups);
 }
 
 std::string region_label(const VolumeMesh& mesh, int reference) {

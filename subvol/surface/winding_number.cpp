@@ -109,23 +109,23 @@ Index WindingNumber::build(std::vector<Index>& order, Index begin, Index end) {
   };
   Eigen::AlignedBox3d box;
   double area = 0;
-  node.centre = node.area_vector = Vec3::Zero();
+  node.center = node.area_vector = Vec3::Zero();
   node.moment = Mat3::Zero();
   for (Index i = begin; i < end; ++i) {
     const Vec3 c = centroid(order[i]), n = area_vector(order[i]);
     box.extend(c);
     area += n.norm();
-    node.centre += n.norm() * c;
+    node.center += n.norm() * c;
     node.area_vector += n;
   }
-  node.centre = area > 0 ? Vec3(node.centre / area) : Vec3(box.center());
+  node.center = area > 0 ? Vec3(node.center / area) : Vec3(box.center());
   for (Index i = begin; i < end; ++i) {
     const std::array<Vec3, 3>& corners = unsorted_[order[i]];
     const Vec3 n = area_vector(order[i]);
-    node.moment += (centroid(order[i]) - node.centre) * n.transpose();
+    node.moment += (centroid(order[i]) - node.center) * n.transpose();
     for (std::size_t k = 0; k < 3; ++k) {
-      node.radius = std::max(node.radius, (corners[k] - node.centre).norm());
-      node.second.add((corners[k] + corners[(k + 1) % 3]) / 2 - node.centre, n / 3);  // exact for squares
+      node.radius = std::max(node.radius, (corners[k] - node.center).norm());
+      node.second.add((corners[k] + corners[(k + 1) % 3]) / 2 - node.center, n / 3);  // exact for squares
     }
   }
   if (end - begin > kLeafSize) {
@@ -152,7 +152,7 @@ double WindingNumber::at(const Vec3& p) const {
   SolidAngles near;
   while (size > 0) {
     const Node& node = nodes_[stack[--size]];
-    const Vec3 r = node.centre - p;
+    const Vec3 r = node.center - p;
     const double distance = r.norm();
     if (distance > kFarRadii * node.radius) {
       const double cubed = distance * distance * distance;

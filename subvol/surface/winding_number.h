@@ -40,7 +40,7 @@ class WindingNumber {
     double at(const Vec3& r) const;
   };
   struct Node {
-    Vec3 centre;           ///< center of area
+    Vec3 center;           ///< center of area
     double radius = 0;     ///< radius of the ball around the center that contains the triangles
     Vec3 area_vector;      ///< sum over the triangles
     Mat3 moment;           ///< sum of (centroid - center) area_vector^T

@@ -88,9 +88,9 @@ std::vector<char> cells_inside(const VolumeMesh& mesh, const TriangleMesh& surfa
 std::vector<char> cells_in_box(const VolumeMesh& mesh, const Vec3& low, const Vec3& high) {
   std::vector<char> inside(mesh.num_cells());
   for (std::size_t c = 0; c < inside.size(); ++c) {
-    Vec3 centre = Vec3::Zero();
-    for (Index v : mesh.cell(c)) centre += mesh.positions[v] / static_cast<double>(mesh.cell(c).size());
-    inside[c] = (centre.array() >= low.array()).all() && (centre.array() <= high.array()).all();
+    Vec3 center = Vec3::Zero();
+    for (Index v : mesh.cell(c)) center += mesh.positions[v] / static_cast<double>(mesh.cell(c).size());
+    inside[c] = (center.array() >= low.array()).all() && (center.array() <= high.array()).all();
   }
   return inside;
 }

@@ -357,7 +357,7 @@ void cut_creases(const FeatureTags& tags, const PlaceNumbers& numbers, FeatureTa
         }
     result.creases.push_back({from, crease.v1, crease.sharpness});
   }
-  normalise_tags(result);
+  normalize_tags(result);
 }
 
 }  // namespace

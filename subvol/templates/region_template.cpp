@@ -35,8 +35,8 @@ double area_of(const TriangleMesh& mesh) {
   return area;
 }
 
-/// A labelled grid.
-struct LabelledGrid {
+/// A labeled grid.
+struct LabeledGrid {
   VoxelGrid grid;
   std::vector<int> labels;
   std::size_t wrong_sheets = 0;
@@ -45,7 +45,7 @@ struct LabelledGrid {
   double aligned = 0;
 };
 
-bool is_better(const LabelledGrid& a, const LabelledGrid& b) {
+bool is_better(const LabeledGrid& a, const LabeledGrid& b) {
   return a.wrong_sheets != b.wrong_sheets ? a.wrong_sheets < b.wrong_sheets : a.score < b.score;
 }
 
@@ -69,13 +69,13 @@ class RegionSearch {
   RegionTemplateResult run();
 
  private:
-  std::optional<LabelledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
-  std::optional<LabelledGrid> best_of_cubes(double cells, double most_cells);
-  std::optional<LabelledGrid> labelled(VoxelGrid grid, double cells, bool is_exact);
+  std::optional<LabeledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
+  std::optional<LabeledGrid> best_of_cubes(double cells, double most_cells);
+  std::optional<LabeledGrid> labeled(VoxelGrid grid, double cells, bool is_exact);
   VoxelGrid cubes(const Mat3& frame, double size, double offset) const;
   double size_for(double cells, bool counts_pillow) const;
   double count_of(const VoxelLabels& labels, bool counts_pillow) const;
-  RegionTemplate finished(const LabelledGrid& candidate, std::size_t cells) const;
+  RegionTemplate finished(const LabeledGrid& candidate, std::size_t cells) const;
 
   const RegionSurface& surface_;
   const RegionTemplateOptions& options_;
@@ -131,7 +131,7 @@ VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) con
 }
 
 /// Labels a grid. Returns nothing if its regions cannot be made right.
-std::optional<LabelledGrid> RegionSearch::labelled(VoxelGrid grid, double cells, bool is_exact) {
+std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
   constexpr int kWeightRounds = 5;
   constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
   const auto num_regions = static_cast<int>(surface_.regions.size());
@@ -191,7 +191,7 @@ std::optional<LabelledGrid> RegionSearch::labelled(VoxelGrid grid, double cells,
           if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
         }
     if (all_right && same_pairs) {
-      LabelledGrid candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
+      LabeledGrid candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
       for (std::size_t c = 0; c < labels.num_cells(); ++c)
         candidate.score += (1 - fractions[labels.label(static_cast<Index>(c))][c]) * unit *
                            (volumes.empty() ? 1 : volumes[c]) / volume_;
@@ -210,10 +210,10 @@ std::optional<LabelledGrid> RegionSearch::labelled(VoxelGrid grid, double cells,
   return std::nullopt;
 }
 
-std::optional<LabelledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
+std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
   constexpr int kGrids = 5;
   constexpr double kLeast = 0.6, kMost = 1.25, kFiner = 0.85, kCoarser = 1.25, kBelieved = 8;
-  std::optional<LabelledGrid> best;
+  std::optional<LabeledGrid> best;
   double size = size_for(cells, options_.for_pillow), finer = 0, coarser = 0;
   const auto step = [&](bool too_fine, double factor) {
     (too_fine ? finer : coarser) = size;
@@ -227,8 +227,8 @@ std::optional<LabelledGrid> RegionSearch::best_through(const AxisPlanes& planes,
     }
     const double aligned = share_on_lines(planes, lines);
     if (aligned < kNoPlanes) break;
-    std::optional<LabelledGrid> found =
-        labelled(grid_through(planes.frame, with_spare_layers(std::move(lines), size)), cells, aligned > kAllPlanes);
+    std::optional<LabeledGrid> found =
+        labeled(grid_through(planes.frame, with_spare_layers(std::move(lines), size)), cells, aligned > kAllPlanes);
     if (!found) {
       step(false, kFiner);
       continue;
@@ -243,24 +243,24 @@ std::optional<LabelledGrid> RegionSearch::best_through(const AxisPlanes& planes,
   return best;
 }
 
-std::optional<LabelledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
+std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
   constexpr double kMost = 1.25;
   constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
   double size = size_for(cells, options_.for_pillow);
-  std::optional<LabelledGrid> best;
+  std::optional<LabeledGrid> best;
   for (const double factor : kSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
         VoxelGrid grid = cubes(frame, factor * size, offset);
         if (static_cast<double>(grid.num_cells()) > most_cells) continue;
-        std::optional<LabelledGrid> found = labelled(std::move(grid), cells, false);
+        std::optional<LabeledGrid> found = labeled(std::move(grid), cells, false);
         if (!found) continue;
         if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
           const double corrected = size * std::cbrt(found->share);
-          found = labelled(cubes(frame, factor * corrected, offset), cells, false);
+          found = labeled(cubes(frame, factor * corrected, offset), cells, false);
           if (found) size = corrected;
         }
         if (found && (!best || is_better(*found, *best))) best = std::move(found);
@@ -269,7 +269,7 @@ std::optional<LabelledGrid> RegionSearch::best_of_cubes(double cells, double mos
   return best;
 }
 
-RegionTemplate RegionSearch::finished(const LabelledGrid& candidate, std::size_t cells) const {
+RegionTemplate RegionSearch::finished(const LabeledGrid& candidate, std::size_t cells) const {
   RegionTemplate result;
   std::vector<char> kept;
   for (const int label : candidate.labels) kept.push_back(label != kOutside);
@@ -291,7 +291,7 @@ RegionTemplateResult RegionSearch::run() {
   constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
   const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
   RegionTemplateResult result;
-  std::optional<LabelledGrid> best;
+  std::optional<LabeledGrid> best;
   std::size_t asked = 0;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     fraction_ = rung == 0 ? 0 : static_cast<double>(rung) / kLadder.size();
@@ -299,7 +299,7 @@ RegionTemplateResult RegionSearch::run() {
     if (result.cancelled) return result;
     const double cells = kLadder[rung] * static_cast<double>(options_.cells);
     const double most_cells = kLeastRoom + kRoom * cells;
-    std::optional<LabelledGrid> found = best_through(planes, cells, most_cells);
+    std::optional<LabeledGrid> found = best_through(planes, cells, most_cells);
     if (!found && !stop_.is_stopped()) found = best_of_cubes(cells, most_cells);
     if (stop_.is_stopped()) {
       result.cancelled = true;

@@ -198,7 +198,7 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
     for (int k = 0; k < parts; ++k)
       result.tags.creases.push_back({vertex_at(lower, k), vertex_at(lower, k + 1), crease.sharpness});
   }
-  normalise_tags(result.tags);
+  normalize_tags(result.tags);
   require_sound(result, "split");
   result.regions = mesh.regions;
   if (!mesh.face_groups.empty()) {

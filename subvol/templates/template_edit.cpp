@@ -32,7 +32,7 @@ bool corners_positive(const VolumeMesh& mesh, std::size_t cell) {
   return true;
 }
 
-void normalise_tags(FeatureTags& tags) {
+void normalize_tags(FeatureTags& tags) {
   std::erase_if(tags.creases, [](const CreaseEdge& c) { return c.v0 == c.v1; });
   for (CreaseEdge& c : tags.creases)
     if (c.v0 > c.v1) std::swap(c.v0, c.v1);

@@ -30,6 +30,6 @@ void drop_lost_tags(VolumeMesh& mesh);
 
 /// Sorts tags as `FeatureTags` requires; of equal entries the one with the larger sharpness remains. Drops creases
 /// whose ends are the same vertex.
-void normalise_tags(FeatureTags& tags);
+void normalize_tags(FeatureTags& tags);
 
 }  // namespace subvol

@@ -13,7 +13,7 @@ namespace subvol::internal {
 namespace {
 
 struct Facet {
-  Vec3 centre, area_vector;
+  Vec3 center, area_vector;
 };
 
 std::vector<Facet> facets_of(const TriangleMesh& surface) {
@@ -36,11 +36,11 @@ Mat3 principal_frame(const std::vector<Facet>& facets) {
   Vec3 mean = Vec3::Zero();
   for (const Facet& f : facets) {
     area += f.area_vector.norm();
-    mean += f.area_vector.norm() * f.centre;
+    mean += f.area_vector.norm() * f.center;
   }
   mean /= area;
   Mat3 spread = Mat3::Zero();
-  for (const Facet& f : facets) spread += f.area_vector.norm() * (f.centre - mean) * (f.centre - mean).transpose();
+  for (const Facet& f : facets) spread += f.area_vector.norm() * (f.center - mean) * (f.center - mean).transpose();
   return right_handed(Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors());
 }
 

@@ -101,7 +101,7 @@ VolumeFaceGroups merged_groups(const VolumeFaceGroups& groups, std::span<const I
     corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
     if (corners.size() >= 3) merged.faces.push_back({face_key(corners), entry.group});
   }
-  normalise(merged);
+  normalize(merged);
   return merged;
 }
 
@@ -149,7 +149,7 @@ VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target,
   merged.tags = mesh.tags;
   for (CreaseEdge& crease : merged.tags.creases) crease.v0 = target[crease.v0], crease.v1 = target[crease.v1];
   for (CornerVertex& corner : merged.tags.corners) corner.vertex = target[corner.vertex];
-  normalise_tags(merged.tags);
+  normalize_tags(merged.tags);
   const std::vector<char> all(merged.num_cells(), 1);
   FeatureTags tags = std::move(merged.tags);  // checked only after the cells have proved valid
   merged.tags = {};

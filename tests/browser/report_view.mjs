@@ -34,7 +34,7 @@ async function look() {
 addEventListener("load", look);
 </script><body></body>`;
 
-const lightness = (colour) => colour.match(/\d+/g).slice(0, 3).reduce((sum, c) => sum + Number(c), 0) / (3 * 255);
+const lightness = (color) => color.match(/\d+/g).slice(0, 3).reduce((sum, c) => sum + Number(c), 0) / (3 * 255);
 for (const [scheme, flag] of [["light", 1], ["dark", 0]]) {
   const { answer, complaints } = await show("/", { "/": harness, "/report.html": readFileSync(file) },
     ["--window-size=1280,900", `--blink-settings=preferredColorScheme=${flag}`]);

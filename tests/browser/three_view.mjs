@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Loads .glb files with three.js in headless Chromium:
 //   node three_view.mjs NODE_MODULES FILE.glb ... [--pictures FOLDER]
-// Each must be there as a picture: no error, vertices' box on the screen where pixels are drawn, several colours; an
+// Each must be there as a picture: no error, vertices' box on the screen where pixels are drawn, several colors; an
 // animation must change it and end where it began to be. Exit status 0: all are.
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { basename, dirname, join } from "node:path";
@@ -23,7 +23,7 @@ for (const file of files) {
   const wrong = [...answer.errors, ...complaints];
   if (answer.seen) {
     const { share, hues, box, sum } = answer.seen;
-    const is_plain = !("colour_map" in answer.extras);
+    const is_plain = !("color_map" in answer.extras);
     if (!(share > LEAST_SHARE)) wrong.push(`only ${100 * share} % of the picture is drawn`);
     if (!is_plain && hues < LEAST_HUES) wrong.push(`${hues} hues, expected ${LEAST_HUES}`);
     if (!box.every((edge, k) => Math.abs(edge - answer.projected[k]) <= MOST_PIXELS_OFF))

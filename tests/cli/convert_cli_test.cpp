@@ -59,10 +59,10 @@ TEST_CASE("The option --references chooses the cell data that become references,
   std::string bytes = content_of(place / "plain.vtk");
   bytes.replace(bytes.find("CELL_DATA"), bytes.npos,
                 "CELL_DATA 2\nFIELD f 3\nvtkGhostType 1 2 unsigned_char\n0 1\nMaterialIds 1 2 double\n7 9\n"
-                "colour 1 2 int\n3 4\n");
+                "color 1 2 int\n3 4\n");
   place.file("a.vtk", bytes);
-  for (const auto& [options, references] : {std::pair("", std::vector{7, 9}), {" --references colour", {3, 4}},
-                                            {" --references vtkGhostType", {0, 1}}}) {
+  for (const auto& [options, references] :
+       {std::pair("", std::vector{7, 9}), {" --references color", {3, 4}}, {" --references vtkGhostType", {0, 1}}}) {
     const std::string given = options;
     CAPTURE(given);
     const Run run = place.run("convert a.vtk --force -o b.mesh" + given);

@@ -134,7 +134,7 @@ TEST_CASE("check: the groups of a mesh are compared with those of the target, by
     const bool on_left = std::ranges::all_of(face, [&](Index v) { return block.positions[v].x() <= 1; });
     if (on(2, 2) && on_left) block.face_groups.faces.push_back({face_key(face), 1});
   }
-  normalise(block.face_groups);
+  normalize(block.face_groups);
   write_obj(place / "target.obj", surface);
   write_volume(place / "mesh.msh", block);
   const Run run = place.run("check mesh.msh --target target.obj --report check.json");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The verbs beside fit as their users run them: shells, high-order files, optimisation, templates.
+// The verbs beside fit as their users run them: shells, high-order files, optimization, templates.
 
 #include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"
@@ -202,9 +202,9 @@ TEST_CASE("A shell of hexes and prisms numbers its cells layer by layer", "[cli]
   REQUIRE(worst.size() == 3);
   for (const auto& cell : worst) {
     const auto corners = by_layer.cell(cell.at("cell").get<std::size_t>());
-    subvol::Vec3 centre = subvol::Vec3::Zero();
-    for (const subvol::Index v : corners) centre += by_layer.positions[v] / static_cast<double>(corners.size());
-    for (int k = 0; k < 3; ++k) CHECK(cell.at("centre")[k].get<double>() == Approx(centre[k]));
+    subvol::Vec3 center = subvol::Vec3::Zero();
+    for (const subvol::Index v : corners) center += by_layer.positions[v] / static_cast<double>(corners.size());
+    for (int k = 0; k < 3; ++k) CHECK(cell.at("center")[k].get<double>() == Approx(center[k]));
   }
 }
 

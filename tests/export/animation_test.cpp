@@ -32,7 +32,7 @@ FitResult short_fit(bool keep_states) {
                                 {.levels = 2, .max_iterations = 3, .keep_states = keep_states});
 }
 
-/// Largest distance of positions from the unit sphere's neighbourhood, as a share.
+/// Largest distance of positions from the unit sphere's neighborhood, as a share.
 double roughness(const std::vector<Vec3>& positions) {
   double largest = 0;
   for (const Vec3& p : positions) largest = std::max(largest, std::abs(p.norm() - 1));

@@ -120,7 +120,7 @@ TEST_CASE("CalculiX bends a cantilever of C3D8 and of C3D20 by the right amount,
       if (mesh.positions[cell[0]][0] == 0) add({cell[0], cell[3], cell[7], cell[4]}, 0);
       if (mesh.positions[cell[1]][0] == 10) add({cell[1], cell[2], cell[6], cell[5]}, 1);
     }
-    normalise(mesh.face_groups);
+    normalize(mesh.face_groups);
     const TemporaryFolder folder;
     if (order == 1) {
       write_volume(folder / "mesh.inp", mesh);

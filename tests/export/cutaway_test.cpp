@@ -106,7 +106,7 @@ TEST_CASE("the plane of a cutaway stands where it is told to") {
   CHECK(cutaway_scene(lattice(4, 3, 1), std::vector<double>(12, 1)).nodes.size() == 2);  // nothing to take off
 }
 
-TEST_CASE("cut faces have the colour of their own cell, the surface the least around") {
+TEST_CASE("cut faces have the color of their own cell, the surface the least around") {
   const VolumeMesh mesh = lattice(3, 3, 2);
   std::vector<double> minima;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) minima.push_back(0.05 * static_cast<double>(c));

@@ -39,7 +39,7 @@ bool has_extra(const Scene& scene, const std::string& key) {
 
 }  // namespace
 
-TEST_CASE("the scene of a cage holds its limit surface, coloured by the finest cells, and the cage's edges") {
+TEST_CASE("the scene of a cage holds its limit surface, colored by the finest cells, and the cage's edges") {
   const VolumeMesh cage = cage_of_two_kinds();
   const VolumeMesh finest = subdivide(cage).fine;
   const Scene scene = surface_scene(cage, &finest, {.name = "cage", .max_chord_percent = 0.1, .source = "cage.mesh"});
@@ -57,7 +57,7 @@ TEST_CASE("the scene of a cage holds its limit surface, coloured by the finest c
     CHECK(surface.indices[i] == surface.indices[i + 3]);
     CHECK(surface.indices[i + 2] == surface.indices[i + 4]);
   }
-  for (const char* key : {"source", "colour_map", "chord_error"}) CHECK(has_extra(scene, key));
+  for (const char* key : {"source", "color_map", "chord_error"}) CHECK(has_extra(scene, key));
   const GlbFile file(gltf_bytes(scene, GltfContainer::glb));
   CHECK(file.attribute<float>("surface", "POSITION").size() == 3 * surface.positions.size());
   CHECK(gltf_bytes(scene, GltfContainer::glb) ==
@@ -75,7 +75,7 @@ TEST_CASE("a patch has the quality of the child cell at its corner") {
   const std::vector<double> marked = patch_quality(cage, surface, marks);
   REQUIRE(marked.size() == surface.patches.size());
   for (std::size_t p = 0; p < marked.size(); ++p) {
-    // The child that is meant has the face's corner, its cell's centre, and lies in the face's cell.
+    // The child that is meant has the face's corner, its cell's center, and lies in the face's cell.
     const Index f = topology.boundary_faces()[surface.patches[p].face];
     const Index corner = topology.face(f)[surface.patches[p].corner];
     const auto cell = child.cell(static_cast<std::size_t>(marked[p]));
@@ -103,7 +103,7 @@ TEST_CASE("positions are written relative to the middle of the bounding box") {
 }
 
 TEST_CASE("the scene of a plain mesh has its flat faces, parted where they meet sharply") {
-  const Scene scene = boundary_scene(lattice(2, 2, 2), {.metres_per_unit = 0.01});
+  const Scene scene = boundary_scene(lattice(2, 2, 2), {.meters_per_unit = 0.01});
   const ScenePrimitive& surface = scene.nodes[0].primitive;
   CHECK(surface.positions.size() == 6u * 9u);
   CHECK(surface.indices.size() == 24u * 6u);
@@ -113,7 +113,7 @@ TEST_CASE("the scene of a plain mesh has its flat faces, parted where they meet 
   CHECK(file.json["nodes"][0]["scale"][0] == 0.01);
 }
 
-TEST_CASE("polygons without quality have no colours") {
+TEST_CASE("polygons without quality have no colors") {
   PolygonMesh square;
   square.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   square.face_vertices = {0, 1, 2, 3};
@@ -219,7 +219,7 @@ TEST_CASE("options out of range are refused") {
   CHECK_THROWS_AS(surface_scene(cage, &stranger, {}), InputError);
 }
 
-TEST_CASE("a scene of sheets has a node for each with its attribute and colours, and one wireframe") {
+TEST_CASE("a scene of sheets has a node for each with its attribute and colors, and one wireframe") {
   const PolygonMesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {0, 4}, {0, 1, 2, 3}};
   PolygonMesh above = square;
   for (Vec3& p : above.positions) p.z() = 1;
@@ -235,7 +235,7 @@ TEST_CASE("a scene of sheets has a node for each with its attribute and colours,
   CHECK(scene.nodes[1].primitive.attributes[0].values == std::vector<double>{1, 2, 3, 4});
   CHECK(scene.nodes[2].name == "wireframe");
   CHECK(scene.nodes[2].primitive.indices.size() == 16);
-  CHECK(has_extra(scene, "colour_map"));
+  CHECK(has_extra(scene, "color_map"));
   CHECK(scene.origin == Vec3(0.5, 0.5, 0.5));
   CHECK_NOTHROW(gltf_bytes(scene, GltfContainer::glb));
   CHECK_THROWS_AS(sheet_scene({}, ""), InputError);

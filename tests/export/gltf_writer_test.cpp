@@ -42,8 +42,8 @@ Scene two_quads(Vec3 offset = Vec3(1e5, -2e5, 3e4)) {
   return {.name = "two quads",
           .nodes = {{"surface", quads}, {"wireframe", lines}},
           .origin = offset + Vec3(1, 0.5, 0.05),
-          .metres_per_unit = 0.001,
-          .extras = {{"source", std::string("quads.mesh")}, {"colour_map", std::string(kQualityColorMap)}},
+          .meters_per_unit = 0.001,
+          .extras = {{"source", std::string("quads.mesh")}, {"color_map", std::string(kQualityColorMap)}},
           .options = {{"levels", 3.0}, {"tolerance", 0.005}, {"cage_only", false}}};
 }
 
@@ -104,8 +104,8 @@ TEST_CASE("the root node carries scale, place and extras, and the asset the gene
   }
   CHECK(file.json["asset"]["generator"] == std::string("subvol ") + version());
   CHECK(root["extras"] == file.json["asset"]["extras"]);
-  CHECK(root["extras"]["unit"] == "metre");
-  CHECK(root["extras"]["metres_per_input_unit"] == 0.001);
+  CHECK(root["extras"]["unit"] == "meter");
+  CHECK(root["extras"]["meters_per_input_unit"] == 0.001);
   CHECK(root["extras"]["up_axis"] == "y");
   CHECK(root["extras"]["source"] == "quads.mesh");
   CHECK(root["extras"]["version"] == version());
@@ -127,7 +127,7 @@ TEST_CASE("z up is turned into y up by the root node") {
   CHECK((translation - turn * (0.001 * scene.origin)).norm() < kRounding * scene.origin.norm());
 }
 
-TEST_CASE("colours are linear, normalised and the same for equal quality") {
+TEST_CASE("colors are linear, normalized and the same for equal quality") {
   const GlbFile file(gltf_bytes(two_quads(), GltfContainer::glb));
   const auto words = file.attribute<std::uint16_t>("surface", "COLOR_0");
   REQUIRE(words.size() == 24);
@@ -139,7 +139,7 @@ TEST_CASE("colours are linear, normalised and the same for equal quality") {
   CHECK(accessor["normalized"] == true);
 }
 
-TEST_CASE("lightness of the quality colours rises with quality") {
+TEST_CASE("lightness of the quality colors rises with quality") {
   const auto luminance = [](double q) {
     const LinearColor c = quality_color(q);
     return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
@@ -201,7 +201,7 @@ TEST_CASE("a scene that cannot be written is refused with the name of the node a
   CHECK_THAT(refusal([](Scene&, P& p) { p.indices[4] = 6; }), Contains("from 0 to 5, got 6"));
   CHECK_THAT(refusal([](Scene&, P& p) { p.indices[4] = -1; }), Contains("got -1"));
   CHECK_THAT(refusal([](Scene&, P& p) { p.material_color[0] = -1; }), Contains("material_color"));
-  CHECK_THAT(refusal([](Scene& s, P&) { s.metres_per_unit = 0; }), Contains("metres_per_unit"));
+  CHECK_THAT(refusal([](Scene& s, P&) { s.meters_per_unit = 0; }), Contains("meters_per_unit"));
   CHECK_THAT(refusal([](Scene& s, P&) { s.origin.x() = kNaN; }), Contains("origin"));
   CHECK_THAT(refusal([](Scene& s, P&) { s.options[1].second = kNaN; }), Contains("tolerance"));
   CHECK_THAT(refusal([](Scene& s, P&) { s.name = "\xff"; }), Contains("UTF-8"));

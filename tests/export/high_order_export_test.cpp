@@ -62,12 +62,12 @@ TEST_CASE("patches lie on the curved boundary and have its normals") {
       for (const Index v : vertices)
         canonical.push_back(
             canonical_vertices(mesh.space.kind(c))[std::find(cell.begin(), cell.end(), v) - cell.begin()]);
-      Vec3 centre = Vec3::Zero();
-      for (const Vec3& x : canonical) centre += x / static_cast<double>(canonical.size());
+      Vec3 center = Vec3::Zero();
+      for (const Vec3& x : canonical) center += x / static_cast<double>(canonical.size());
       const std::size_t n = canonical.size(), k = static_cast<std::size_t>(corner);
       const auto at = [&](double u, double v) {
         return Vec3((1 - u) * (1 - v) * canonical[k] + u * (1 - v) * (canonical[k] + canonical[(k + 1) % n]) / 2 +
-                    u * v * centre + (1 - u) * v * (canonical[k] + canonical[(k + n - 1) % n]) / 2);
+                    u * v * center + (1 - u) * v * (canonical[k] + canonical[(k + n - 1) % n]) / 2);
       };
       CHECK((positions[0] - mesh.coefficients[vertices[k]]).norm() < 1e-14);
       for (std::size_t j = 0; j < 3; ++j)

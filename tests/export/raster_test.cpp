@@ -14,7 +14,7 @@ namespace {
 
 constexpr LinearColor kRed{1, 0, 0, 1}, kGreen{0, 1, 0, 1};
 
-/// A square of half the picture's width, at a height, of one colour.
+/// A square of half the picture's width, at a height, of one color.
 void add_square(RasterSurface& surface, double half, double z, const LinearColor& color) {
   const auto first = static_cast<Index>(surface.mesh.positions.size());
   for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) {
@@ -74,7 +74,7 @@ TEST_CASE("Edges are drawn where they are in sight", "[raster]") {
 TEST_CASE("A view shows all of a mesh", "[raster]") {
   const std::vector<Vec3> corners = {{5, 1, 1}, {9, 1, 1}, {5, 3, 1}, {9, 3, 2}};
   const RasterView view = view_of(corners);
-  for (const Vec3& p : corners) CHECK((p - view.centre).norm() <= view.radius * (1 + 1e-12));
+  for (const Vec3& p : corners) CHECK((p - view.center).norm() <= view.radius * (1 + 1e-12));
   CHECK(view_of({}).radius == 1);
   CHECK(view_of(std::vector<Vec3>(3, Vec3(1, 1, 1))).radius == 1);
 }

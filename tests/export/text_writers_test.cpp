@@ -86,7 +86,7 @@ TEST_CASE("an .obj keeps the quads and reads back as the same doubles") {
 
 TEST_CASE("a .usda cage read back has the same points and faces and is a Catmull-Clark surface") {
   const PolygonMesh mesh = cube();
-  const UsdaFile file(usd_text(mesh, cube_tags(), {.name = "cage_1", .metres_per_unit = 0.01, .up_axis = UpAxis::z}));
+  const UsdaFile file(usd_text(mesh, cube_tags(), {.name = "cage_1", .meters_per_unit = 0.01, .up_axis = UpAxis::z}));
   CHECK(file.stage.at("defaultPrim") == "cage_1");
   CHECK(file.prim == "cage_1");
   CHECK(file.stage.at("metersPerUnit") == "0.01");
@@ -198,7 +198,7 @@ TEST_CASE("cages that cannot be written are refused") {
   refused([](M&, T&, O& o) { o.name = "1cage"; });
   refused([](M&, T&, O& o) { o.name = "my cage"; });
   refused([](M&, T&, O& o) { o.name = ""; });
-  refused([](M&, T&, O& o) { o.metres_per_unit = 0; });
+  refused([](M&, T&, O& o) { o.meters_per_unit = 0; });
   PolygonMesh broken = cube();
   broken.positions[0].x() = kNotANumber;
   CHECK_THROWS_AS(obj_text(broken), InputError);

@@ -182,7 +182,7 @@ TEST_CASE("a .msh of version 2.2 has the physical group of every element") {
   VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
   mesh.face_groups.groups[1].number = 9;
   mesh.face_groups.faces.push_back({mesh.face_groups.faces[0].face, 1});  // a face of two groups
-  normalise(mesh.face_groups);
+  normalize(mesh.face_groups);
   mesh.references.assign(mesh.num_cells(), 3);
   mesh.references[0] = 0;
   mesh.regions = {{"steel", 3, 3}};

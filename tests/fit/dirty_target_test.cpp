@@ -40,10 +40,10 @@ void tear(TriangleMesh& mesh) {
 
 /// Holes, as where a scanner does not see.
 void pierce(TriangleMesh& mesh) {
-  const Vec3 centres[] = {Vec3(1, 0.2, 0), Vec3(-0.3, 1, 0.4), Vec3(0, -0.5, -1)};
+  const Vec3 centers[] = {Vec3(1, 0.2, 0), Vec3(-0.3, 1, 0.4), Vec3(0, -0.5, -1)};
   std::erase_if(mesh.triangles, [&](const std::array<Index, 3>& t) {
-    return std::any_of(std::begin(centres), std::end(centres), [&](const Vec3& centre) {
-      return mesh.positions[t[0]].normalized().dot(centre.normalized()) > 0.97;
+    return std::any_of(std::begin(centers), std::end(centers), [&](const Vec3& center) {
+      return mesh.positions[t[0]].normalized().dot(center.normalized()) > 0.97;
     });
   });
 }

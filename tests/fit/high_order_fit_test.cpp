@@ -189,7 +189,7 @@ TEST_CASE("curved elements keep sharp edges if they are asked to, or if the temp
   };
   TriangleMesh target = cube_surface(16, false);
   for (Vec3& p : target.positions) p = barrel(p);
-  VolumeMesh cells = centred_lattice(2);
+  VolumeMesh cells = centered_lattice(2);
   for (Vec3& p : cells.positions) p *= 0.93;
 
   const HighOrderFitResult round = fit_high_order(target, cells, of_order(2));

@@ -218,7 +218,7 @@ TEST_CASE("Options and targets that a check cannot work with are refused whateve
   }
 }
 
-TEST_CASE("refined triangles pass through the bilinear centres and stay watertight", "[boundary_triangles]") {
+TEST_CASE("refined triangles pass through the bilinear centers and stay watertight", "[boundary_triangles]") {
   VolumeMesh mesh = lattice(2, 2, 1);
   for (Vec3& p : mesh.positions) p += 0.2 * Vec3(std::sin(3 * p[1] + p[2]), std::sin(2 * p[0]), std::cos(p[0] * p[1]));
   const PolygonMesh boundary = boundary_surface(mesh, MeshTopology(mesh));

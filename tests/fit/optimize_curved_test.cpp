@@ -84,7 +84,7 @@ TEST_CASE("Nodes of curved cells move within flat faces, along straight borders,
     if (std::ranges::all_of(topology.face(f), [&](Index v) { return block.positions[v].x() == 0; }) &&
         std::ranges::all_of(topology.face(f), [&](Index v) { return block.positions[v].y() <= 1; }))
       block.face_groups.faces.push_back({face_key(topology.face(f)), 0});
-  normalise(block.face_groups);
+  normalize(block.face_groups);
   CHECK(rank_at(mesh, block, {0, 1, 1}) == 1);  // on the border of the group
   CHECK(rank_at(mesh, block, {0, 1, 0}) == 0);  // where it reaches an edge
 }

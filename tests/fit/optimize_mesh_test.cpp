@@ -78,7 +78,7 @@ TEST_CASE("A scrambled lattice of each kind gets back the lattice's quality") {
     }
 }
 
-TEST_CASE("Optimisation: fixed boundary vertices stay bit by bit; the others slide along their surface") {
+TEST_CASE("Optimization: fixed boundary vertices stay bit by bit; the others slide along their surface") {
   constexpr int kSize = 4;
   const VolumeMesh lattice = test::lattice(kSize, kSize, kSize);
   VolumeMesh start = lattice;
@@ -107,7 +107,7 @@ TEST_CASE("Optimisation: fixed boundary vertices stay bit by bit; the others sli
   }
 }
 
-TEST_CASE("Optimisation keeps creases that the mesh's tags name, whatever their angle") {
+TEST_CASE("Optimization keeps creases that the mesh's tags name, whatever their angle") {
   constexpr int kSize = 4;
   constexpr double kLine = 1.5;
   VolumeMesh mesh = test::lattice(kSize, kSize, kSize);
@@ -151,7 +151,7 @@ TEST_CASE("Graded meshes stay graded with local sizes, and become even with unif
   CHECK(farthest_move(CellSizes::uniform) > 0.3);
 }
 
-TEST_CASE("Without a target, optimisation keeps the volume of a curved body") {
+TEST_CASE("Without a target, optimization keeps the volume of a curved body") {
   constexpr int kLength = 24, kWidth = 4;
   VolumeMesh bar = test::lattice(kLength, kWidth, kWidth);
   std::mt19937 random(7);
@@ -171,8 +171,8 @@ TEST_CASE("Without a target, optimisation keeps the volume of a curved body") {
   CHECK(region_volumes(result.mesh)[0] == Approx(region_volumes(bar)[0]).epsilon(1e-6));
 }
 
-TEST_CASE("Optimisation says which cells stay inverted") {
-  // A vertex of the boundary on the wrong side of its neighbours: no inner vertex can help.
+TEST_CASE("Optimization says which cells stay inverted") {
+  // A vertex of the boundary on the wrong side of its neighbors: no inner vertex can help.
   VolumeMesh mesh = test::lattice(3, 3, 3);
   const Index corner = 0;
   REQUIRE(mesh.positions[corner] == Vec3(0, 0, 0));
@@ -185,7 +185,7 @@ TEST_CASE("Optimisation says which cells stay inverted") {
   for (const Vec3& p : result.mesh.positions) CHECK(p.allFinite());
 }
 
-TEST_CASE("Optimisation draws the boundary to a target, and keeps references and tags") {
+TEST_CASE("Optimization draws the boundary to a target, and keeps references and tags") {
   VolumeMesh mesh = test::lattice(3, 3, 3);
   mesh.references.assign(mesh.num_cells(), 7);
   test::tag_creases(mesh, 40);
@@ -201,7 +201,7 @@ TEST_CASE("Optimisation draws the boundary to a target, and keeps references and
   CHECK(result.mesh.tags == mesh.tags);
 }
 
-TEST_CASE("Optimisation gives the same bits for any number of threads, and can be cancelled") {
+TEST_CASE("Optimization gives the same bits for any number of threads, and can be cancelled") {
   const VolumeMesh start = scrambled(test::lattice(4, 4, 4), 4, 9);
   const int threads = omp_get_max_threads();
   omp_set_num_threads(1);
@@ -218,7 +218,7 @@ TEST_CASE("Optimisation gives the same bits for any number of threads, and can b
   CHECK(cancelled.uncertified == certify(cancelled.mesh).not_certified);
 }
 
-TEST_CASE("Optimisation refuses options out of range and meshes that are not sound") {
+TEST_CASE("Optimization refuses options out of range and meshes that are not sound") {
   const VolumeMesh mesh = test::lattice(2, 2, 2);
   const TriangleMesh target = refined_surface(mesh);
   CHECK_THROWS_AS(optimize_mesh(mesh, &target, {.fixed_boundary = true}), InputError);

@@ -56,7 +56,7 @@ PointCloud read(const std::string& name, const std::string& text, std::vector<st
 
 }  // namespace
 
-TEST_CASE("Neighbours tell a cloud's normals, area and volume") {
+TEST_CASE("Neighbors tell a cloud's normals, area and volume") {
   const PointCloud cloud = on_sphere(4000);
   const CloudGeometry geometry = cloud_geometry(cloud.points);
   CHECK(geometry.area == Approx(4 * std::numbers::pi).epsilon(0.03));

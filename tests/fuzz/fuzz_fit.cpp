@@ -51,9 +51,9 @@ TriangleMesh small_target(bool fine) {
   TriangleMesh split = mesh;
   split.triangles.clear();
   for (const auto& [a, b, c] : mesh.triangles) {
-    const auto centre = static_cast<Index>(split.positions.size());
+    const auto center = static_cast<Index>(split.positions.size());
     split.positions.push_back(0.5 * (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]));
-    for (const auto& [p, q] : {std::array{a, b}, {b, c}, {c, a}}) split.triangles.push_back({p, q, centre});
+    for (const auto& [p, q] : {std::array{a, b}, {b, c}, {c, a}}) split.triangles.push_back({p, q, center});
   }
   return split;
 }

@@ -126,8 +126,9 @@ void write_surfaces(const fs::path& folder) {
         "\"Geometry::\", \"Mesh\" {\nVertices: *9 {\na: "
         "0,0,0,1,0,0,0,1,0\n}\nPolygonVertexIndex: *3 {\na: 0,1,-3\n}\n}\nModel: 2, \"Model::\", \"Mesh\" {\nVersion: "
         "232\n}\n}\nConnections: {\nC: \"OO\",2,0\nC: \"OO\",1,2\n}\n");
-  write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
-                                   "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
+  write(folder / "off", "colors",
+        "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
+        "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
   write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
                                    "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
   fs::create_directories(folder / "obj");
@@ -215,7 +216,7 @@ void write_program_files(const fs::path& folder) {
 "converged": true, "stages": [{"name": "a", "unknowns": 8, "iterations": 1, "energy": {"surface": 1, "volume": 2},
 "history": [{"energy": {"surface": 1, "volume": 0.5, "total": 1.5}}], "seconds": 0.1, "kept": false}],
 "initial_distance": {"mean_percent": 1, "max_percent": 2}, "quality": {"cells": 2, "min_scaled_jacobian": 0.5,
-"histogram": [0, 1, 3], "worst_cells": [{"cell": 1, "scaled_jacobian": 0.5, "centre": [0, 1, 2]}]},
+"histogram": [0, 1, 3], "worst_cells": [{"cell": 1, "scaled_jacobian": 0.5, "center": [0, 1, 2]}]},
 "boundary_self_intersections": 0, "warnings": ["w"], "seconds": {"total": 1}, "peak_memory_bytes": 1000000})");
   write(folder / "json", "shell", R"({"subvol": "0.1", "command": "shell", "valid": true, "thickness": {"inside":
 {"asked": {"mean": 1, "min": 1, "max": 1}}}, "input": {"surface": {"path": "s.obj"}}})");

@@ -23,7 +23,7 @@ def facts(thing):
     world = [thing.matrix_world @ vertex.co for vertex in mesh.vertices]
     found.update(vertices=len(mesh.vertices), edges=len(mesh.edges), faces=len(mesh.polygons),
                  low=[min(p[k] for p in world) for k in range(3)], high=[max(p[k] for p in world) for k in range(3)],
-                 colours=[layer.name for layer in mesh.color_attributes], attributes=[a.name for a in mesh.attributes],
+                 colors=[layer.name for layer in mesh.color_attributes], attributes=[a.name for a in mesh.attributes],
                  shapes=[key.name for key in mesh.shape_keys.key_blocks] if mesh.shape_keys else [])
     if mesh.polygons:
         corners = [set(polygon.vertices) for polygon in mesh.polygons]

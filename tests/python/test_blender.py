@@ -94,19 +94,19 @@ class Scenes(InFolder):
     def things(self, name):
         return self.told[f"{name}.glb"]["things"]
 
-    def test_names_extras_and_colours(self):
+    def test_names_extras_and_colors(self):
         things = self.things("torus")
         self.assertEqual(set(things), {"torus", "surface", "wireframe"})
         extras = things["torus"]["extras"]
-        self.assertEqual(extras["unit"], "metre")
+        self.assertEqual(extras["unit"], "meter")
         self.assertEqual(extras["version"], subvol.__version__)
-        self.assertEqual(extras["metres_per_input_unit"], 0.01)
+        self.assertEqual(extras["meters_per_input_unit"], 0.01)
         self.assertIn("levels", extras["options"])
-        self.assertEqual(len(things["surface"]["colours"]), 1)
+        self.assertEqual(len(things["surface"]["colors"]), 1)
         for name in ("surface", "wireframe"):
             self.assertEqual(things[name]["parent"], "torus")
 
-    def test_the_size_in_metres_and_the_edges(self):
+    def test_the_size_in_meters_and_the_edges(self):
         surface, wires = self.things("torus")["surface"], self.things("torus")["wireframe"]
         points = 0.01 * subvol.limit_surface(self.fit.cage).points
         # Blender's z is up: glTF's (x, y, z) is its (x, -z, y).
@@ -131,7 +131,7 @@ class Scenes(InFolder):
         things = self.things("inside")
         self.assertEqual(set(things), {"inside", "surface", "cut", "wireframe"})
         self.assertGreater(things["cut"]["faces"], 50)
-        self.assertEqual(len(things["cut"]["colours"]), 1)
+        self.assertEqual(len(things["cut"]["colors"]), 1)
 
     def test_states_of_the_fit_are_shape_keys_with_an_action(self):
         surface = self.things("steps")["surface"]

@@ -211,7 +211,7 @@ class States(InFolder):
             subvol.fit(*BALL, levels=2, checkpoint="ball.checkpoint", progress=fails)
         self.assertGreater(subvol.fit(*BALL, levels=2, resume="ball.checkpoint").report["recalled_stages"], 0)
 
-    def test_curved_cells_are_optimised(self):
+    def test_curved_cells_are_optimized(self):
         curved = subvol.fit(*BALL, order=2, max_iterations=3).mesh
         alone = subvol.optimize(curved)
         self.assertTrue(alone.report["valid"])
@@ -223,7 +223,7 @@ class States(InFolder):
         with self.assertRaisesRegex(subvol.InputError, "keeps its shape"):
             subvol.optimize(curved, tolerance=1.0)
 
-    def test_an_optimisation_goes_on(self):
+    def test_an_optimization_goes_on(self):
         options = dict(target=BALL[0], order=2, max_iterations=5)
         whole = subvol.optimize(BALL[1], **options, checkpoint="curve.checkpoint")
         resumed = subvol.optimize(BALL[1], **options, resume="curve.checkpoint")

@@ -147,9 +147,9 @@ class SurfaceMeshes(InFolder):
 
     def test_tags_off_the_boundary_are_left_out(self):
         grid = subvol.template.grid(box=[0, 0, 0, 2, 2, 2], counts=[2, 2, 2])
-        centre = 13
-        np.testing.assert_array_equal(grid.points[centre], [1, 1, 1])
-        mesh = subvol.VolumeMesh(grid.points, hexes=grid.hexes, creases=[[4, centre], [25, 26]], corners=[centre, 14])
+        center = 13
+        np.testing.assert_array_equal(grid.points[center], [1, 1, 1])
+        mesh = subvol.VolumeMesh(grid.points, hexes=grid.hexes, creases=[[4, center], [25, 26]], corners=[center, 14])
         boundary = mesh.boundary()
         np.testing.assert_array_equal(boundary.points[boundary.corners], grid.points[[14]])
         np.testing.assert_array_equal(boundary.points[boundary.creases], [grid.points[[25, 26]]])
@@ -192,8 +192,8 @@ class SurfaceMeshes(InFolder):
             subvol.write("surface.msh", subvol.read("torus_target.off"))
         with self.assertRaisesRegex(TypeError, "expected a mesh or a result, not ndarray"):
             subvol.write("points.mesh", CUBE_POINTS)
-        with self.assertRaisesRegex(TypeError, "there is no option 'colour'"):
-            subvol.write("cube.glb", cube(), colour="red")
+        with self.assertRaisesRegex(TypeError, "there is no option 'color'"):
+            subvol.write("cube.glb", cube(), color="red")
 
     def test_points_that_are_not_finite_are_refused(self):
         mesh = cube()

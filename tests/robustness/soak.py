@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hundreds of fits, shells and optimisations of random shapes; nothing may crash, hang, or claim what is not so.
+"""Hundreds of fits, shells and optimizations of random shapes; nothing may crash, hang, or claim what is not so.
 
 Usage: tests/robustness/soak.py PROGRAM [--runs N] [--first K] [--seed S] [--time-limit T] [--minutes M] [--keep FOLDER]
 

@@ -53,7 +53,7 @@ inline TriangleMesh tetrahedron_surface() {
 }
 
 /// A cubic lattice of n^3 cells in [-1, 1]^3.
-inline VolumeMesh centred_lattice(int n) {
+inline VolumeMesh centered_lattice(int n) {
   VolumeMesh mesh = lattice(n, n, n);
   for (Vec3& p : mesh.positions) p = p * (2.0 / n) - Vec3::Ones();
   return mesh;
@@ -80,7 +80,7 @@ struct RoutedLattice {
   VolumeMesh grid, fitted;
   FeatureRouting routing;
   RoutedLattice(const TriangleMesh& target, int n)
-      : features(features_of(target)), grid(centred_lattice(n)), fitted(grid) {
+      : features(features_of(target)), grid(centered_lattice(n)), fitted(grid) {
     fitted.positions = fitted_to(target, grid);
     routing = route_features(fitted, features);
   }

@@ -19,7 +19,7 @@ inline VolumeMesh with_floor_and_roof(VolumeMesh mesh, double height) {
                       [&](Index v) { return mesh.positions[v].z() == (group == 0 ? 0 : height); }))
         mesh.face_groups.faces.push_back({face_key(face), group});
   }
-  normalise(mesh.face_groups);
+  normalize(mesh.face_groups);
   return mesh;
 }
 

@@ -56,7 +56,7 @@ inline VolumeMesh lattice(int nx, int ny, int nz) {
   return voxels(nx, ny, nz, [](int, int, int) { return true; });
 }
 
-/// A lattice of n^3 cubes, each cut into six pyramids around its centre.
+/// A lattice of n^3 cubes, each cut into six pyramids around its center.
 inline VolumeMesh pyramid_lattice(int n) {
   const VolumeMesh cubes = lattice(n, n, n);
   VolumeMesh mesh;

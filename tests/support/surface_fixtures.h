@@ -70,8 +70,8 @@ inline TriangleMesh triangle_soup(std::size_t n, double size, unsigned seed) {
   RandomPoints random(seed);
   TriangleMesh mesh;
   for (std::size_t t = 0; t < n; ++t) {
-    const Vec3 centre = random.point();
-    for (int k = 0; k < 3; ++k) mesh.positions.push_back(centre + random.point(size));
+    const Vec3 center = random.point();
+    for (int k = 0; k < 3; ++k) mesh.positions.push_back(center + random.point(size));
     const auto v = static_cast<Index>(3 * t);
     mesh.triangles.push_back({v, v + 1, v + 2});
   }

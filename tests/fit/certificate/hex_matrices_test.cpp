@@ -147,7 +147,7 @@ void check_narrow(HexBoxes& boxes, const HexBoxes::Box& box) {
   if (box.halved > 0) return;  // of other models than its own
   HexBoxes::Box precise;
   precise.level = box.level, precise.levels = box.levels, precise.index = box.index, precise.tiers = box.tiers;
-  precise.modelled_levels = box.modelled_levels, precise.modelled_index = box.modelled_index;
+  precise.modeled_levels = box.modeled_levels, precise.modeled_index = box.modeled_index;
   boxes.with_matrices(precise, [](const auto&) {});
   const NarrowHexCoefficients& narrow = *box.narrow;
   const HexCoefficients& exact = *precise.coefficients;

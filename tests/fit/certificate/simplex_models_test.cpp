@@ -167,11 +167,11 @@ TEST_CASE("models of functions on simplices are as close to them as they say", "
                   coefficients[alpha] = batch.coefficients[batch.address(slot, alpha)];
                 const double* b = coefficients.data();
                 Barycentric slopes;
-                const double modelled = bernstein_sum(tables.index, b, l, slopes);
+                const double modeled = bernstein_sum(tables.index, b, l, slopes);
                 Vec3 local = Vec3::Zero();
                 for (int d = 0; d < dimension; ++d) local[d] = slopes[d + 1] - slopes[0];
                 const double off = (by_canonical * local - exact).head(dimension).cwiseAbs().maxCoeff();
-                worst = std::max({worst, std::abs(modelled - value) - part->error(slot, tier),
+                worst = std::max({worst, std::abs(modeled - value) - part->error(slot, tier),
                                   off - part->gradient_error(slot, tier)});
                 const double largest = *std::max_element(b, b + tables.index.size(), [](double left, double right) {
                   return std::abs(left) < std::abs(right);

@@ -55,7 +55,7 @@ TEST_CASE("polynomial_map: the bound holds, and raised orders meet the distance 
     }
 }
 
-TEST_CASE("polynomial_map: orders end at the limits, which neighbours share", "[elements]") {
+TEST_CASE("polynomial_map: orders end at the limits, which neighbors share", "[elements]") {
   PointSource source(3);
   const VolumeMesh cells = mixed_cells();
   for (const Basis basis : kBothBases) {

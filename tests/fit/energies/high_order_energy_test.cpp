@@ -98,7 +98,7 @@ TEST_CASE("gradient and Hessian of curved cells agree with differences for every
       }
 }
 
-TEST_CASE("the regularised barrier of curved cells is finite if they are inverted, with the derivatives of its value",
+TEST_CASE("the regularized barrier of curved cells is finite if they are inverted, with the derivatives of its value",
           "[elements]") {
   PointSource source(7);
   for (CellKind kind : kAllKinds)
@@ -110,7 +110,7 @@ TEST_CASE("the regularised barrier of curved cells is finite if they are inverte
       x[0] += 3 * (x[1] - x[0]);
       for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
       CHECK(std::isinf(energy.value(x)));
-      energy.set_regularisation(0.1);
+      energy.set_regularization(0.1);
       const double value = energy.value(x);
       REQUIRE(std::isfinite(value));
       CHECK(energy.uncertified(x).empty());
@@ -134,7 +134,7 @@ TEST_CASE("the regularised barrier of curved cells is finite if they are inverte
       CHECK(slope ==
             Approx((energy.value(moved_along(x, d, h)) - energy.value(moved_along(x, d, -h))) / (2 * h)).epsilon(1e-5));
       CHECK(curvature > 0);
-      energy.set_regularisation(0);
+      energy.set_regularization(0);
       CHECK(std::isinf(energy.value(x)));
     }
 }
@@ -154,7 +154,7 @@ TEST_CASE("cells of curved meshes weigh as they are told to", "[elements]") {
   CHECK(energy.value(curved.coefficients) == Approx(0.75 * alone));
   CHECK_THROWS_AS(energy.set_weights(std::vector{1.0}), InputError);
   CHECK_THROWS_AS(energy.set_weights(std::vector{1.0, 0.0}), InputError);
-  CHECK_THROWS_AS(energy.set_regularisation(-1), InputError);
+  CHECK_THROWS_AS(energy.set_regularization(-1), InputError);
 }
 
 TEST_CASE("gradient and Hessian of a mesh of all kinds and mixed orders agree with differences", "[elements]") {

@@ -53,7 +53,7 @@ TEST_CASE("regions too small for votes join the patch nearby, and everything has
   REQUIRE(tip != target.positions.end());
   *tip = Vec3(0.1, 0.1, 1.15);
   const SignedFeatures features = features_of(target);
-  const VolumeMesh mesh = centred_lattice(3);
+  const VolumeMesh mesh = centered_lattice(3);
   const FeatureRouting routing = route_features(mesh, features);
   CHECK(routing.paths.size() == 12);
   const MeshTopology topology(mesh);
@@ -67,7 +67,7 @@ TEST_CASE("regions too small for votes join the patch nearby, and everything has
 
 TEST_CASE("smooth edges have the target's angle at the scale of the mesh") {
   const TriangleMesh flat = cube_surface(2, false), round = cube_surface(16, true);
-  const VolumeMesh mesh = centred_lattice(4);
+  const VolumeMesh mesh = centered_lattice(4);
   const MeshTopology topology(mesh);
   for (const EdgeAngle& edge : smooth_edge_angles(topology, RoutedLattice(flat, 4).routing.paths, mesh.positions, flat))
     CHECK(edge.angle == Approx(180));

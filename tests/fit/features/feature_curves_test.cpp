@@ -117,8 +117,8 @@ TEST_CASE("each of many cubes gets its paths, whatever its vertices' numbers") {
   for (int n = 0; n < kCubes * kCubes * kCubes; ++n) {
     const TriangleMesh cube = cube_surface(2, false);
     const auto first = static_cast<Index>(target.positions.size());
-    const Vec3 centre = Vec3::Ones() + 4 * Vec3(n % kCubes, n / kCubes % kCubes, n / kCubes / kCubes);
-    for (const Vec3& p : cube.positions) target.positions.push_back(centre + p);
+    const Vec3 center = Vec3::Ones() + 4 * Vec3(n % kCubes, n / kCubes % kCubes, n / kCubes / kCubes);
+    for (const Vec3& p : cube.positions) target.positions.push_back(center + p);
     for (const auto& t : cube.triangles) target.triangles.push_back({first + t[0], first + t[1], first + t[2]});
   }
   const FeatureCurves curves = feature_curves(target, 40);

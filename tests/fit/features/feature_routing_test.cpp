@@ -15,6 +15,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -127,7 +128,7 @@ TEST_CASE("the reflex edge of an L prefers the edge of three cells") {
 }
 
 TEST_CASE("curves that are not followed have a reason and a place") {
-  const VolumeMesh mesh = centred_lattice(4);
+  const VolumeMesh mesh = centered_lattice(4);
   const auto reasons = [&](const TriangleMesh& target, const RoutingOptions& options = {}) {
     std::map<NotFollowed, int> count;
     const SignedFeatures features = features_of(target);
@@ -163,8 +164,8 @@ TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its nei
       if (p.z() > -1) p.z() -= (p.z() + 1) / 4 * std::abs(p.x() - p.y());
     return mesh;
   };
-  const VolumeMesh fitted = ridged(centred_lattice(6));
-  TriangleMesh target = surface_of(ridged(centred_lattice(1)));
+  const VolumeMesh fitted = ridged(centered_lattice(6));
+  TriangleMesh target = surface_of(ridged(centered_lattice(1)));
   const SignedFeatures features = features_of(target);
   REQUIRE(features.angles.size() == 13);
   const FeatureRouting routing = route_features(fitted, features);
@@ -201,7 +202,7 @@ TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
   TriangleMesh target = cube_surface(2, false);
   for (Vec3& p : target.positions)
     if (p.x() > 0.9) p.x() = kEnd;
-  const VolumeMesh mesh = centred_lattice(4);
+  const VolumeMesh mesh = centered_lattice(4);
   const SignedFeatures features = features_of(target);
   const FeatureRouting routing = route_features(mesh, features);
   REQUIRE(routing.parts.size() == 4);
@@ -230,10 +231,45 @@ TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
   CHECK(route_features(mesh, features, options).parts.empty());
 }
 
+TEST_CASE("a closed curve that is blocked in one place is followed around the rest") {
+  // The lattice of a cylinder has a notch, where no vertex is near its two circles.
+  const TriangleMesh target = prism_surface(24, 0.1);
+  VolumeMesh mesh = centered_lattice(8);
+  for (Vec3& p : mesh.positions) {  // the square becomes a disk
+    const double square = std::max(std::abs(p.x()), std::abs(p.y())), round = std::hypot(p.x(), p.y());
+    if (round > 0) p.x() *= square / round, p.y() *= square / round;
+  }
+  const SignedFeatures features = features_of(target);
+  REQUIRE(features.curves.curves.size() == 2);
+  CHECK(route_features(mesh, features).parts.empty());
+  const double h = RoutingGraph(mesh).edge_length();
+  for (Vec3& p : mesh.positions)
+    if (p.x() > 0.8 && std::abs(p.y()) < 1.5 * h) p.x() -= 1.5 * h;
+  const FeatureRouting routing = route_features(mesh, features);
+  REQUIRE(routing.parts.size() == 2);
+  CHECK(routing.unfollowed.size() == 2);
+  require_apart(routing);
+  const FeatureCurves followed = followed_parts(mesh, features, routing);
+  for (std::size_t i = 0; i < routing.parts.size(); ++i) {
+    const FollowedPart& part = routing.parts[i];
+    const FeatureCurve &whole = features.curves.curves[part.curve], &curve = followed.curves[part.curve];
+    const UnfollowedCurve& lost = routing.unfollowed[i];
+    CHECK(whole.closed());
+    CHECK_FALSE(curve.closed());
+    CHECK(curve.vertices.size() == curve.points.size());
+    CHECK(curve.length() == Approx(part.to - part.from));
+    CHECK(lost.curve == part.curve);
+    CHECK(lost.length + curve.length() == Approx(whole.length()));
+    CHECK(polyline_length(lost.points) == Approx(lost.length));
+    CHECK(lost.place.x() > 0.5);
+    CHECK(routing.paths[i].vertices.front() != routing.paths[i].vertices.back());
+  }
+}
+
 TEST_CASE("corners of a step that is smaller than an edge may share a vertex") {
   const TriangleMesh target = block_with_step(0.1);
   const SignedFeatures features = features_of(target);
-  const VolumeMesh mesh = centred_lattice(4);
+  const VolumeMesh mesh = centered_lattice(4);
   const RoutingGraph graph(mesh);
   std::vector<std::uint8_t> followed, vanishing;
   for (const FeatureCurve& curve : features.curves.curves) {
@@ -268,7 +304,7 @@ TEST_CASE("routing that is cancelled finds no more paths") {
   RoutingOptions options;
   int asked = 0;
   options.cancelled = [&] { return ++asked > 20; };
-  const FeatureRouting routing = route_features(centred_lattice(4), features, options);
+  const FeatureRouting routing = route_features(centered_lattice(4), features, options);
   CHECK(routing.paths.size() < 12);
   CHECK(routing.paths.size() + routing.unfollowed.size() == 12);
   CHECK(asked < 500);
@@ -288,11 +324,11 @@ TEST_CASE("routing is the same for any number of threads") {
 
 TEST_CASE("routing refuses options of another size and positions that are not finite") {
   const SignedFeatures features = features_of(cube_surface(2, false));
-  VolumeMesh mesh = centred_lattice(2);
+  VolumeMesh mesh = centered_lattice(2);
   RoutingOptions options;
   options.excluded.assign(11, 0);
   CHECK_THROWS_AS(route_features(mesh, features, options), InputError);
   mesh.positions[0].x() = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(route_features(mesh, features), InputError);
-  CHECK(route_features(centred_lattice(2), {}).paths.empty());
+  CHECK(route_features(centered_lattice(2), {}).paths.empty());
 }

@@ -112,7 +112,7 @@ TEST_CASE("a cube turned in its grid gets a pad at each side that edges cross") 
   const TriangleMesh target = prism_surface(4);
   const SignedFeatures features = features_of(target);
   // Upright edges of the cube lie on the axes, those of the grid between them.
-  const VolumeMesh grid = centred_lattice(4);
+  const VolumeMesh grid = centered_lattice(4);
   VolumeMesh fitted = grid;
   for (Vec3& p : fitted.positions)
     if (const double sum = p.head<2>().lpNorm<1>(); sum > 0) p.head<2>() *= p.head<2>().lpNorm<Eigen::Infinity>() / sum;

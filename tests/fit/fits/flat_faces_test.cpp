@@ -22,7 +22,7 @@ namespace {
 
 /// A lattice in the cube [-1, 1]^3 whose vertices are off their places by up to `noise` in each direction.
 VolumeMesh noisy_cube(int n, double noise) {
-  VolumeMesh mesh = centred_lattice(n);
+  VolumeMesh mesh = centered_lattice(n);
   std::mt19937_64 engine(1);
   std::uniform_real_distribution<double> off(-noise, noise);
   for (Vec3& p : mesh.positions) p += Vec3(off(engine), off(engine), off(engine));

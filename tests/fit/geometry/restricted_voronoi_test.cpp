@@ -268,7 +268,7 @@ TEST_CASE("sites that differ by roundings share the surface without loss") {
   CHECK(cover_error(mesh, RestrictedVoronoi(sites).compute(mesh.positions, mesh.triangles)) < kCoverTolerance);
 }
 
-TEST_CASE("all sites as near as each other: the sphere's centre is no trap") {
+TEST_CASE("all sites as near as each other: the sphere's center is no trap") {
   TriangleMesh mesh = cube_surface(6, false);
   for (Vec3& p : mesh.positions) p *= 1e-3;
   const std::vector<Vec3> sites = cube_surface(12, true).positions;

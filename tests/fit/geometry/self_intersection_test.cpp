@@ -51,7 +51,7 @@ TEST_CASE("surfaces that cross or touch are found with their triangles", "[self_
   CHECK(self_intersections(crossing).pairs == Pairs{{0, 1}});
 }
 
-TEST_CASE("neighbours intersect only when folded or crossing beyond what they share", "[self_intersection]") {
+TEST_CASE("neighbors intersect only when folded or crossing beyond what they share", "[self_intersection]") {
   const std::vector<Vec3> flat = {{0, 0, 0},    {1, 0, 0},     {0, 1, 0},      {0.5, 0.5, 0},
                                   {0.5, -1, 0}, {0.3, 0.3, 1}, {0.3, 0.2, -1}};
   const auto pairs = [&](Index a, Index b, Index c) {
@@ -81,8 +81,8 @@ TEST_CASE("self-intersections of a soup do not depend on threads, numbering or p
   std::normal_distribution<double> normal;
   TriangleMesh soup;
   for (Index t = 0; t < 400; ++t) {
-    const Vec3 centre = 3 * Vec3(normal(engine), normal(engine), normal(engine));
-    for (int k = 0; k < 3; ++k) soup.positions.push_back(centre + Vec3(normal(engine), normal(engine), normal(engine)));
+    const Vec3 center = 3 * Vec3(normal(engine), normal(engine), normal(engine));
+    for (int k = 0; k < 3; ++k) soup.positions.push_back(center + Vec3(normal(engine), normal(engine), normal(engine)));
     soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }
   const int before = omp_get_max_threads();

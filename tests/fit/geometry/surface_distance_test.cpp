@@ -58,12 +58,12 @@ TEST_CASE("closest points agree with a search of all triangles, with and without
   std::normal_distribution<double> normal;
   TriangleMesh soup;
   for (Index t = 0; t < 300; ++t) {
-    const Vec3 centre(normal(engine), normal(engine), normal(engine));
+    const Vec3 center(normal(engine), normal(engine), normal(engine));
     for (int k = 0; k < 3; ++k) {
       const Vec3 offset = 0.2 * Vec3(normal(engine), normal(engine), normal(engine));
       const bool point = t % 50 == 7, needle = t % 50 == 9;
       const Vec3 kept = point ? Vec3::Zero() : needle ? Vec3(offset[0], offset[0], 0) : offset;
-      soup.positions.push_back(centre + kept);
+      soup.positions.push_back(center + kept);
     }
     soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }

@@ -123,7 +123,7 @@ TEST_CASE("mirrored and flat cells count as inverted, and the worst come first",
   CHECK(report.worst_cells[1].cell == 4);
   CHECK(report.worst_cells[1].value == 0);
   CHECK(report.worst_cells[2].cell == 0);
-  CHECK(report.worst_cells[0].centre.isApprox(Vec3(0.5, 0.5, -0.5)));
+  CHECK(report.worst_cells[0].center.isApprox(Vec3(0.5, 0.5, -0.5)));
   CHECK(report.histogram[0] == 1);
   CHECK(report.histogram[10] == 1);
   CHECK(report.histogram[19] == 28);

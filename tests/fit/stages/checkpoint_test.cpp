@@ -84,14 +84,14 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits", "[slow]"
     });
 }
 
-TEST_CASE("A fit that was stopped within a minimisation ends at the same bits", "[slow]") {
+TEST_CASE("A fit that was stopped within a minimization ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const auto run = [&](StageLog* log) {
     FitOptions options{.levels = 2};
     options.log = log;
     return fit_subdivision_volume(sample.target, sample.template_mesh, options);
   };
-  // What a checkpoint held at each moment that a minimisation was not over.
+  // What a checkpoint held at each moment that a minimization was not over.
   std::vector<std::vector<SolvedStage>> moments;
   StageLog whole;
   whole.on_add = [&] {
@@ -110,7 +110,7 @@ TEST_CASE("A fit that was stopped within a minimisation ends at the same bits", 
   }
 }
 
-TEST_CASE("A minimisation that was stopped after cells were densified ends at the same bits", "[slow]") {
+TEST_CASE("A minimization that was stopped after cells were densified ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   const auto run = [&](StageLog* log) {
     HighOrderFitOptions options{
@@ -162,7 +162,7 @@ TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the s
     });
 }
 
-TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits", "[slow]") {
+TEST_CASE("An optimization that goes on from a checkpoint ends at the same bits", "[slow]") {
   VolumeMesh mesh = test::lattice(4, 4, 4);
   const MeshTopology topology(mesh);
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
@@ -177,7 +177,7 @@ TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits"
   });
 }
 
-TEST_CASE("An optimisation whose boundary is far from its target goes on to the same bits", "[slow]") {
+TEST_CASE("An optimization whose boundary is far from its target goes on to the same bits", "[slow]") {
   // Beyond the edges of a convex boundary two triangles are equally far.
   const VolumeMesh mesh = test::lattice(3, 3, 3);
   TriangleMesh target = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
@@ -303,7 +303,7 @@ TEST_CASE("A checkpoint with a right fingerprint and wrong content is refused") 
   SECTION("a position that is not finite") { stage.x[0].x() = std::numeric_limits<double>::infinity(); }
   SECTION("a negative time") { stage.seconds = -1; }
   SECTION("a negative count") { stage.result.iterations[0].evaluations = -1; }
-  SECTION("a minimisation after one that is not over") { stage.result.stop = MinimizerStop::cancelled; }
+  SECTION("a minimization after one that is not over") { stage.result.stop = MinimizerStop::cancelled; }
   CHECK_THROWS_WITH(parse_checkpoint(checkpoint_bytes({}, {stage, small_stage()}), "c"),
                     Catch::Contains("what no run writes"));
 }

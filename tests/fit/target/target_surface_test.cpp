@@ -42,9 +42,9 @@ TEST_CASE("a closed target has its area, volume, length and box") {
   CHECK(target.volume_source() == VolumeSource::signed_sum);
   CHECK(target.length() == Approx(1. / 3));
   CHECK(target.diagonal() == Approx(std::sqrt(12.)));
-  CHECK((target.centre() - Vec3(1e4, 0, 0)).norm() < 1e-9);
+  CHECK((target.center() - Vec3(1e4, 0, 0)).norm() < 1e-9);
   for (std::size_t t = 0; t < target.triangles().size(); ++t)
-    REQUIRE(target.normals()[t].dot(target.samples()[t] - target.centre()) == Approx(1));
+    REQUIRE(target.normals()[t].dot(target.samples()[t] - target.center()) == Approx(1));
 }
 
 TEST_CASE("a soup of a closed surface has the same volume, inside out or not") {
@@ -159,7 +159,7 @@ TEST_CASE("triangles without area are dropped, positions of no triangle are igno
   CHECK(target.diagonal() == Approx(std::sqrt(12.)));
 }
 
-TEST_CASE("samples are barycentres, or those of parts no longer than the spacing") {
+TEST_CASE("samples are barycenters, or those of parts no longer than the spacing") {
   const TriangleMesh mesh = cube_surface(2, false);
   CHECK(TargetSurface(mesh).samples().size() == mesh.triangles.size());
   const TargetSurface target(mesh, {.sample_spacing = 0.3});

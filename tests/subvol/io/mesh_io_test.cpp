@@ -102,12 +102,12 @@ TEST_CASE("edges that are not ridges are no creases, and ridges inside the mesh 
   write_volume_mesh(folder / "out.mesh", mesh);
   std::string text = content_of(folder / "out.mesh");
   text.resize(text.size() - 4);
-  Index centre = 0;
-  while (mesh.positions[static_cast<std::size_t>(centre)] != Vec3(1, 1, 1)) ++centre;
+  Index center = 0;
+  while (mesh.positions[static_cast<std::size_t>(center)] != Vec3(1, 1, 1)) ++center;
   Index below = 0;
   while (mesh.positions[static_cast<std::size_t>(below)] != Vec3(1, 1, 0)) ++below;
   text +=
-      "Edges\n2\n1 2 0\n" + std::to_string(centre + 1) + " " + std::to_string(below + 1) + " 0\nRidges\n1\n2\nEnd\n";
+      "Edges\n2\n1 2 0\n" + std::to_string(center + 1) + " " + std::to_string(below + 1) + " 0\nRidges\n1\n2\nEnd\n";
   std::vector<std::string> warnings;
   CHECK(read_text(text, &warnings).tags.empty());
   REQUIRE(warnings.size() == 1);

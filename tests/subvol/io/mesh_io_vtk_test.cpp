@@ -174,7 +174,7 @@ TEST_CASE("references come from the cell data that are meant, and from those tha
   for (const char* other : {"vtkGhostType", "vtkOriginalCellIds", "GlobalIds", "GlobalElementId", "PedigreeIds",
                             "cell_id", "ids", "avtGhostZones"}) {
     CAPTURE(other);
-    CHECK(read({ints(other, 40), ints("colour", 5)}) == wanted);
+    CHECK(read({ints(other, 40), ints("color", 5)}) == wanted);
     CHECK(read({ints(other, 40)}).empty());
     CHECK(read({ints("MaterialIds", 40), ints(other, 5)}, other) == wanted);
   }
@@ -190,11 +190,11 @@ TEST_CASE("references come from the cell data that are meant, and from those tha
   CHECK(read({reals("MaterialIds", 5, 0.5)}).empty());         // 5.5 is no reference
   CHECK(read({ints("Region%20Id", 5)}, "region id") == wanted);
   std::vector<std::string> warnings;
-  read({ints("colour", 5), ints("shade", 40)}, "", &warnings);
+  read({ints("color", 5), ints("shade", 40)}, "", &warnings);
   REQUIRE(warnings.size() == 3);  // of lower dimension, of the other array, and which was taken
-  CHECK_THAT(warnings[0] + warnings[1] + warnings[2], Contains("'colour'") && Contains("--references"));
-  CHECK_THROWS_WITH(read({ints("colour", 5), reals("q", 0, 0.5)}, "material"),
-                    Contains("in.vtk") && Contains("'material'") && Contains("'colour'") && Contains("'q'"));
+  CHECK_THAT(warnings[0] + warnings[1] + warnings[2], Contains("'color'") && Contains("--references"));
+  CHECK_THROWS_WITH(read({ints("color", 5), reals("q", 0, 0.5)}, "material"),
+                    Contains("in.vtk") && Contains("'material'") && Contains("'color'") && Contains("'q'"));
   const TemporaryFolder folder;
   write_volume_mesh(folder / "a.mesh", lattice(1, 1, 1));
   CHECK_THROWS_WITH(read_volume_mesh(folder / "a.mesh", {.references = "material"}), Contains("without a name"));
@@ -203,13 +203,13 @@ TEST_CASE("references come from the cell data that are meant, and from those tha
 TEST_CASE("cell data become references whatever attributes stand before them") {
   const bool binary = GENERATE(false, true);
   const auto numbers = [&](std::size_t n) { return array_of(std::vector<float>(n, -0.5f), binary); };
-  const auto colours = [&](std::size_t n) { return binary ? std::string(n, '\x7f') + "\n" : numbers(n); };
+  const auto colors = [&](std::size_t n) { return binary ? std::string(n, '\x7f') + "\n" : numbers(n); };
   const auto ids = [&](std::size_t n) { return array_of(std::vector<std::int64_t>(n, 1'000'000'000'000), binary); };
   const std::string bytes =
       vtk_file({"3.0", binary}, kPoints, kCells, kTypes) + "POINT_DATA 11\nVECTORS v float\n" + numbers(3 * 11) +
       "NORMALS n float\n" + numbers(3 * 11) + "METADATA\nINFORMATION 0\n\nTENSORS t float\n" + numbers(9 * 11) +
       "TEXTURE_COORDINATES uv 2 float\n" + numbers(2 * 11) + "SCALARS q float\nLOOKUP_TABLE table\n" + numbers(11) +
-      "LOOKUP_TABLE table 3\n" + colours(4 * 3) + "COLOR_SCALARS c 3\n" + colours(3 * 11) +
+      "LOOKUP_TABLE table 3\n" + colors(4 * 3) + "COLOR_SCALARS c 3\n" + colors(3 * 11) +
       "GLOBAL_IDS g vtktypeint64\n" + ids(11) + "CELL_DATA 5\nGLOBAL_IDS g vtktypeint64\n" + ids(5) +
       "VECTORS v float\n" + numbers(3 * 5) + "SCALARS part int\nLOOKUP_TABLE default\n" +
       array_of(std::vector<std::int32_t>{5, 6, 7, 8, 9}, binary);

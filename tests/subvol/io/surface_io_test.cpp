@@ -115,7 +115,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 }  // namespace
 
-TEST_CASE("OFF is read with comments, colours, normals and counts of every kind") {
+TEST_CASE("OFF is read with comments, colors, normals and counts of every kind") {
   check_tet(read_triangles("a.off", kTetOff));
   check_tet(read_triangles("a.OFF", replaced(kTetOff, "OFF\n4 4 6", "OFF # c\n\n# c\n4 4")));
   check_tet(read_triangles("a.off", replaced(kTetOff, "OFF\n4 4 6", "OFF 4 4 6")));
@@ -263,13 +263,15 @@ TEST_CASE("what a surface file holds beside its polygons is counted in one warni
   for (const char* face : {"3 0 2 1\n", "3 0 1 3\n", "3 1 2 3\n", "3 2 0 3\n"})
     if (one_color.find(face) != std::string::npos)
       one_color = replaced(one_color, face, std::string(face, 7) + " 255 0 0\n");
-  CHECK_THAT(told("a.off", one_color), Contains("4 colours of faces"));
-  CHECK_THAT(told("a.off", "COFF\n4 4 0\n0 0 0 255 0 0 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0\n0 0 1 .5 .5 .5\n"
-                           "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"),
-             Contains("4 colours of vertices"));
-  CHECK_THAT(told("a.obj", "mtllib m.mtl\no tet\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nv 0 0 1\nvt 0 0\nvn 0 0 1\n"
-                           "g a\nusemtl m\ns off\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\ng b\nf 2 3 4\nf 3 1 4\nl 1 2\n"),
-             Contains("1 colours of vertices, 1 texture coordinates, 1 lines, 1 uses of materials"));
+  CHECK_THAT(told("a.off", one_color), Contains("4 colors of faces"));
+  CHECK_THAT(told("a.off",
+                  "COFF\n4 4 0\n0 0 0 255 0 0 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0\n0 0 1 .5 .5 .5\n"
+                  "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"),
+             Contains("4 colors of vertices"));
+  CHECK_THAT(told("a.obj",
+                  "mtllib m.mtl\no tet\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nv 0 0 1\nvt 0 0\nvn 0 0 1\n"
+                  "g a\nusemtl m\ns off\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\ng b\nf 2 3 4\nf 3 1 4\nl 1 2\n"),
+             Contains("1 colors of vertices, 1 texture coordinates, 1 lines, 1 uses of materials"));
   CHECK_THAT(told("a.stl", binary_stl("b")), Contains("4 facets' attributes"));
   CHECK_THAT(told("a.stl", binary_stl("b", 4, "more")), Contains("4 facets' attributes"));
   CHECK_THAT(told("a.ply", kTextPly),

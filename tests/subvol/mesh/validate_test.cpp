@@ -215,15 +215,15 @@ TEST_CASE("tags off the boundary, out of order or without sharpness are bad") {
     const auto it = std::find(mesh.positions.begin(), mesh.positions.end(), Vec3(x, y, z));
     return static_cast<Index>(it - mesh.positions.begin());
   };
-  const Index centre = vertex_at(1, 1, 1), face = vertex_at(1, 1, 0), corner = vertex_at(0, 0, 0);
+  const Index center = vertex_at(1, 1, 1), face = vertex_at(1, 1, 0), corner = vertex_at(0, 0, 0);
   const Index edge = vertex_at(1, 0, 0);
   const auto crease = [](Index a, Index b, double s) { return CreaseEdge{std::min(a, b), std::max(a, b), s}; };
   mesh.tags.creases = {crease(corner, edge, 1)};
   mesh.tags.corners = {{corner, 2.5}};
   REQUIRE(validate(mesh).empty());
-  SECTION("crease inside") { mesh.tags.creases = {crease(centre, face, 1)}; }
+  SECTION("crease inside") { mesh.tags.creases = {crease(center, face, 1)}; }
   SECTION("crease that is no edge") { mesh.tags.creases = {crease(corner, face, 1)}; }
-  SECTION("corner inside") { mesh.tags.corners = {{centre, 1}}; }
+  SECTION("corner inside") { mesh.tags.corners = {{center, 1}}; }
   SECTION("zero sharpness") { mesh.tags.creases[0].sharpness = 0; }
   SECTION("nan sharpness") { mesh.tags.corners[0].sharpness = std::numeric_limits<double>::quiet_NaN(); }
   SECTION("backwards") { std::swap(mesh.tags.creases[0].v0, mesh.tags.creases[0].v1); }

@@ -107,7 +107,7 @@ TEST_CASE("patches agree with refinement and limit masks at the end of a crease"
   CHECK(difference.normal < kDartNormals);
 }
 
-TEST_CASE("a patch is continued by its neighbour at the same parameter of their common side") {
+TEST_CASE("a patch is continued by its neighbor at the same parameter of their common side") {
   LimitPatches patches(creased(mixed_cells(), 1.3));
   patches.prepare(3);
   const SurfaceTopology& quads = patches.quads();

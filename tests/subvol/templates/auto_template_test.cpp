@@ -118,23 +118,23 @@ TEST_CASE("Of many parts, those that lie in an odd number of others are cavities
   test::RandomPoints random(5);
   TriangleMesh surface;
   struct Part {
-    Vec3 centre;
+    Vec3 center;
     double size;
     int norm;  // the part holds the points whose distance in this norm is below its size: 1, or 0 for the largest of
                // three coordinates; -1: it holds nothing
     Eigen::AlignedBox3d box;
     std::vector<Vec3> points;  // its vertices and the centers of its triangles
     bool holds(const Vec3& p) const {
-      const Vec3 d = (p - centre).cwiseAbs();
+      const Vec3 d = (p - center).cwiseAbs();
       return norm >= 0 && (norm == 1 ? d.sum() : d.maxCoeff()) < (1 + 1e-9) * size;
     }
   };
   std::vector<Part> parts;
-  const auto add = [&](TriangleMesh part, const Vec3& centre, double size, bool inside_out) {
+  const auto add = [&](TriangleMesh part, const Vec3& center, double size, bool inside_out) {
     const auto first = static_cast<Index>(surface.positions.size());
     const int norm = part.triangles.size() == 2 ? -1 : part.triangles.size() == 8 ? 1 : 0;
-    for (Vec3& p : part.positions) p = centre + size * p;
-    parts.push_back({centre, size, norm, {}, part.positions});
+    for (Vec3& p : part.positions) p = center + size * p;
+    parts.push_back({center, size, norm, {}, part.positions});
     for (const Vec3& p : part.positions) parts.back().box.extend(p);
     for (const auto& [a, b, c] : part.triangles)
       parts.back().points.push_back((part.positions[a] + part.positions[b] + part.positions[c]) / 3);
@@ -177,7 +177,7 @@ TEST_CASE("Of many parts, those that lie in an odd number of others are cavities
   CHECK(solid.topology.components > 900);
 }
 
-TEST_CASE("A triangle without a neighbour is no part of a solid and no void in it", "[templates]") {
+TEST_CASE("A triangle without a neighbor is no part of a solid and no void in it", "[templates]") {
   const TriangleMesh cube = test::cube_surface(4, false);
   for (const double place : {0.1, 5.0}) {  // inside and outside
     TriangleMesh stray = cube;

@@ -59,11 +59,11 @@ TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[t
   const TriangleMesh ball = test::cube_surface(10, true);
   const std::vector<char> inside = cells_inside(grid, ball);
   for (std::size_t c = 0; c < grid.num_cells(); ++c) {
-    Vec3 centre = Vec3::Zero();
-    for (Index v : grid.cell(c)) centre += grid.positions[v] / 8;
+    Vec3 center = Vec3::Zero();
+    for (Index v : grid.cell(c)) center += grid.positions[v] / 8;
     // A cell has the half diagonal 0.26; the ball's triangles lie within 0.05 of the sphere.
-    if (centre.norm() < 0.68) CHECK(inside[c]);
-    if (centre.norm() > 1.27) CHECK(!inside[c]);
+    if (center.norm() < 0.68) CHECK(inside[c]);
+    if (center.norm() > 1.27) CHECK(!inside[c]);
   }
   const VolumeMesh carved = carve(grid, [&](std::size_t c) { return inside[c] != 0; });
   check_mesh_is(carved, 1, 0.027 * static_cast<double>(carved.num_cells()));
@@ -74,8 +74,8 @@ TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[t
   const VolumeMesh slab = carve(lattice, [&](std::size_t c) { return low[c] != 0; });
   check_mesh_is(slab, 1, 18);
   CHECK(slab.tags.corners.size() == 4);  // those above have gone
-  const std::vector<char> centre = cells_listed(lattice, std::array<Index, 1>{13});
-  check_mesh_is(carve(lattice, [&](std::size_t c) { return centre[c] == 0; }), 2, 26);
+  const std::vector<char> center = cells_listed(lattice, std::array<Index, 1>{13});
+  check_mesh_is(carve(lattice, [&](std::size_t c) { return center[c] == 0; }), 2, 26);
 
   CHECK_THROWS_AS(carve(lattice, [](std::size_t) { return false; }), InputError);
   CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 4; }), InputError);   // along an edge
@@ -101,9 +101,9 @@ TEST_CASE("A pillow adds a cell per boundary face and moves nothing that was the
 
 TEST_CASE("A pillow around some cells, and of prisms and tets", "[templates]") {
   const VolumeMesh lattice = test::lattice(3, 3, 3);
-  const VolumeMesh around_centre = pillow(lattice, std::array<Index, 1>{13});
-  CHECK(around_centre.num_cells() == 27 + 6);
-  check_mesh_is(around_centre, 1, 27);
+  const VolumeMesh around_center = pillow(lattice, std::array<Index, 1>{13});
+  CHECK(around_center.num_cells() == 27 + 6);
+  check_mesh_is(around_center, 1, 27);
   const VolumeMesh mixed = pillow(test::mixed_cells());
   CHECK(validate(mixed).empty());
   CHECK(euler_number(mixed) == 1);

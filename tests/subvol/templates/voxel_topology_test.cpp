@@ -54,15 +54,15 @@ TEST_CASE("The vertex table agrees with the defects of the cells around a point"
   for (unsigned mask = 1; mask < 256; ++mask) {
     const VolumeMesh mesh =
         test::voxels(2, 2, 2, [&](int i, int j, int k) { return (mask >> (i + 2 * j + 4 * k) & 1) != 0; });
-    bool at_centre = false;
+    bool at_center = false;
     for (const MeshDefect& defect : validate(mesh)) {
       if (defect.kind == MeshDefect::Kind::nonmanifold_vertex)
-        at_centre |= mesh.positions[defect.entity] == Vec3(1, 1, 1);
-      // An edge of two diagonal cells ends at the centre, as all inner edges do.
-      if (defect.kind == MeshDefect::Kind::nonmanifold_edge) at_centre = true;
+        at_center |= mesh.positions[defect.entity] == Vec3(1, 1, 1);
+      // An edge of two diagonal cells ends at the center, as all inner edges do.
+      if (defect.kind == MeshDefect::Kind::nonmanifold_edge) at_center = true;
     }
     INFO(mask);
-    CHECK(vertex_table(VertexRule::manifold)[mask] == !at_centre);
+    CHECK(vertex_table(VertexRule::manifold)[mask] == !at_center);
     if (vertex_table(VertexRule::pillowable)[mask]) CHECK(vertex_table(VertexRule::manifold)[mask]);
   }
   // Three cells in a row along a diagonal staircase see faces both ways.

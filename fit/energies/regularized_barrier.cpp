@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularized_barrier.h"
 
 #include "subvol/fit/energies/singular_values.h"
 
@@ -55,16 +55,16 @@ SignedSingularValues signed_values(const Singular& singular, int lane) {
 }
 
 /// Evaluates the barrier for a batch of another form, and copies its value and first derivative there.
-RegularisedBatch evaluated(DistortionBatch& batch, double epsilon) {
-  RegularisedBatch barrier;
+RegularizedBatch evaluated(DistortionBatch& batch, double epsilon) {
+  RegularizedBatch barrier;
   for (int k = 0; k < 9; ++k) std::copy_n(batch.jacobian[k], kLanes, barrier.jacobian[k]);
-  regularised_barrier(barrier, epsilon);
+  regularized_barrier(barrier, epsilon);
   std::copy_n(barrier.energy, kLanes, batch.energy);
   for (int k = 0; k < 9; ++k) std::copy_n(barrier.stress[k], kLanes, batch.stress[k]);
   return barrier;
 }
 
-void fill_second(const RegularisedBatch& barrier, DistortionBatch& batch) {
+void fill_second(const RegularizedBatch& barrier, DistortionBatch& batch) {
   constexpr double kLeastSquare = 1e-200;
   Wide j[9];
   for (int k = 0; k < 9; ++k) j[k] = load_wide(batch.jacobian[k]);
@@ -93,15 +93,15 @@ void fill_second(const RegularisedBatch& barrier, DistortionBatch& batch) {
 
 }  // namespace
 
-void regularised_gradient(DistortionBatch* batches, int count, double epsilon) {
+void regularized_gradient(DistortionBatch* batches, int count, double epsilon) {
   for (int n = 0; n < count; ++n) evaluated(batches[n], epsilon);
 }
 
-void regularised_hessian(DistortionBatch* batches, int count, double epsilon) {
+void regularized_hessian(DistortionBatch* batches, int count, double epsilon) {
   for (int n = 0; n < count; ++n) fill_second(evaluated(batches[n], epsilon), batches[n]);
 }
 
-void regularised_barrier(RegularisedBatch& batch, double epsilon) {
+void regularized_barrier(RegularizedBatch& batch, double epsilon) {
   const double (&j)[9][kLanes] = batch.jacobian;
   alignas(64) double power[kLanes], chi[kLanes], slope[kLanes], determinant[kLanes], squared[kLanes];
 #pragma omp simd

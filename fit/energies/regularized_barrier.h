@@ -22,7 +22,7 @@ namespace subvol::internal {
 ///   H = alpha I + beta (J (x) C + C (x) J) + gamma C (x) C >= 0,  C = dD/dJ (cofactors)
 ///
 /// Finite for finite J and eps > 0; no value is NaN.
-struct RegularisedBatch {
+struct RegularizedBatch {
   alignas(64) double jacobian[9][kLanes];                     ///< in: laid out as in `DistortionBatch`
   alignas(64) double energy[kLanes];                          ///< > 0
   alignas(64) double stress[9][kLanes];                       ///< de/dJ
@@ -31,7 +31,7 @@ struct RegularisedBatch {
 };
 
 /// Fills everything. epsilon > 0, dimensionless.
-void regularised_barrier(RegularisedBatch& batch, double epsilon);
+void regularized_barrier(RegularizedBatch& batch, double epsilon);
 
 /// These functions evaluate the barrier in the form of the other distortions, with coupled stretches. U and V are the
 /// rotations of J = U diag(s) V^T, where s_2 has the sign of D. Then C = U diag(c) V^T, and so
@@ -39,8 +39,8 @@ void regularised_barrier(RegularisedBatch& batch, double epsilon);
 ///   stretch_i = alpha + 2 beta D + gamma c_i^2,  coupling_ij = beta (s_i c_j + s_j c_i) + gamma c_i c_j,
 ///   pair_same = alpha,  pair_cross = 0,  c_i = D / s_i
 ///
-/// `regularised_gradient` fills `energy` and `stress`, `regularised_hessian` everything. count: number of batches.
-void regularised_gradient(DistortionBatch* batches, int count, double epsilon);
-void regularised_hessian(DistortionBatch* batches, int count, double epsilon);
+/// `regularized_gradient` fills `energy` and `stress`, `regularized_hessian` everything. count: number of batches.
+void regularized_gradient(DistortionBatch* batches, int count, double epsilon);
+void regularized_hessian(DistortionBatch* batches, int count, double epsilon);
 
 }  // namespace subvol::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularized_barrier.h"
 #include "subvol/fit/energies/volume_energy.h"
 #include "tests/support/sample_meshes.h"
 
@@ -23,10 +23,10 @@ struct Value {
 };
 
 Value barrier(const Mat3& jacobian, double epsilon) {
-  RegularisedBatch batch;
+  RegularizedBatch batch;
   for (int k = 0; k < 9; ++k)
     for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
-  regularised_barrier(batch, epsilon);
+  regularized_barrier(batch, epsilon);
   Value value{batch.energy[0], {}, {}, batch.alpha[0], batch.beta[0], batch.gamma[0]};
   for (int k = 0; k < 9; ++k) {
     value.stress(k / 3, k % 3) = batch.stress[k][0];
@@ -50,7 +50,7 @@ Mat3 random_rotation(std::mt19937& random) {
 
 }  // namespace
 
-TEST_CASE("The regularised barrier has the derivative of its value, for inverted Jacobians too") {
+TEST_CASE("The regularized barrier has the derivative of its value, for inverted Jacobians too") {
   std::mt19937 random(3);
   constexpr double kStep = 1e-6, kTolerance = 1e-6;  // central differences
   int inverted = 0;
@@ -68,7 +68,7 @@ TEST_CASE("The regularised barrier has the derivative of its value, for inverted
   CHECK(inverted > 20);
 }
 
-TEST_CASE("The regularised barrier's second derivative is positive definite") {
+TEST_CASE("The regularized barrier's second derivative is positive definite") {
   std::mt19937 random(4);
   for (int trial = 0; trial < 200; ++trial) {
     const Mat3 j = random_matrix(random), d = random_matrix(random);
@@ -79,7 +79,7 @@ TEST_CASE("The regularised barrier's second derivative is positive definite") {
   }
 }
 
-TEST_CASE("Without regularisation the barrier agrees with Hencky's energy about rotations up to second order") {
+TEST_CASE("Without regularization the barrier agrees with Hencky's energy about rotations up to second order") {
   std::mt19937 random(5);
   constexpr double kSize = 1e-3, kTiny = 1e-12;
   for (int trial = 0; trial < 20; ++trial) {
@@ -89,7 +89,7 @@ TEST_CASE("Without regularisation the barrier agrees with Hencky's energy about 
   }
 }
 
-TEST_CASE("The regularised barrier is finite wherever the Jacobian is, and grows as epsilon falls") {
+TEST_CASE("The regularized barrier is finite wherever the Jacobian is, and grows as epsilon falls") {
   Mat3 flat = Mat3::Identity(), mirrored = Mat3::Identity();
   flat(2, 2) = 0;
   mirrored(2, 2) = -1;
@@ -106,14 +106,14 @@ TEST_CASE("The regularised barrier is finite wherever the Jacobian is, and grows
   }
 }
 
-TEST_CASE("A regularised volume energy does not depend on place, orientation or unit") {
+TEST_CASE("A regularized volume energy does not depend on place, orientation or unit") {
   std::mt19937 random(6);
   VolumeMesh mesh = test::mixed_cells();
   test::jitter(mesh, 0.8);
   REQUIRE(test::count_inverted(mesh) > 0);
   const std::vector<Vec3> lengths(mesh.num_cells(), Vec3(1, 1.2, 0.9));
   VolumeEnergy energy(mesh, lengths, 3);
-  energy.set_regularisation(0.1);
+  energy.set_regularization(0.1);
   const double value = energy.value(mesh.positions);
   constexpr double kScale = 7;
   const Mat3 rotation = random_rotation(random);
@@ -121,7 +121,7 @@ TEST_CASE("A regularised volume energy does not depend on place, orientation or 
   for (const Vec3& p : mesh.positions) moved.push_back(kScale * (rotation * p) + Vec3(3, -1, 5));
   for (const Vec3& h : lengths) larger.push_back(kScale * h);
   VolumeEnergy same(mesh, larger, 3);
-  same.set_regularisation(0.1);
+  same.set_regularization(0.1);
   CHECK(same.value(moved) == Approx(value).epsilon(1e-12));
 
   std::vector<Vec3> gradient(mesh.num_vertices(), Vec3::Zero()), direction = gradient, plus, minus;
@@ -137,12 +137,12 @@ TEST_CASE("A regularised volume energy does not depend on place, orientation or 
   }
   CHECK(slope == Approx((energy.value(plus) - energy.value(minus)) / (2 * kStep)).epsilon(1e-5));
   CHECK(energy.uncertified(mesh.positions).empty());
-  energy.set_regularisation(0);
+  energy.set_regularization(0);
   CHECK(std::isinf(energy.value(mesh.positions)));
   CHECK_FALSE(energy.uncertified(mesh.positions).empty());
 }
 
-TEST_CASE("In the form of other distortions, the regularised barrier has the same second derivative") {
+TEST_CASE("In the form of other distortions, the regularized barrier has the same second derivative") {
   std::mt19937 random(6);
   for (int trial = 0; trial < 60; ++trial) {
     Mat3 j = random_matrix(random);
@@ -155,7 +155,7 @@ TEST_CASE("In the form of other distortions, the regularised barrier has the sam
     DistortionBatch batch;
     for (int k = 0; k < 9; ++k)
       for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = j(k / 3, k % 3);
-    regularised_hessian(&batch, 1, epsilon);
+    regularized_hessian(&batch, 1, epsilon);
     const auto matrix_of = [&](const double(*entries)[kLanes]) {
       Mat3 m;
       for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = entries[k][3];
