@@ -7,6 +7,8 @@
 #include "cli/runs/progress.h"
 #include "cli/verbs/template_command.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/base/error.h"
+#include "subvol/fit/target/surface_diagnosis.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/interfaces.h"
@@ -48,6 +50,11 @@ auto make(const AutoArguments& arguments, const Search& search) {
   return result;
 }
 
+int out_of_time() {
+  std::cerr << "subvol: the time limit was reached before a template was made\n";
+  return kNotConverged;
+}
+
 Json topology_json(const BettiNumbers& topology) {
   return {{"components", topology.components},
           {"handles", topology.handles},
@@ -62,12 +69,10 @@ int run_with_regions(AutoArguments arguments, const CLI::App& verb, const std::v
     return region_template(target, {arguments.options.cells, arguments.options.pillow, progress});
   });
   if (result.cancelled && interrupted()) return kInterrupted;
-  if (!result.made) {
-    std::cerr << (result.cancelled ? "subvol: the time limit was reached before a template was made\n"
-                                   : "subvol: no grid that was tried has the topology of the target's regions; ask for "
-                                     "more --cells\n");
-    return result.cancelled ? kNotConverged : kFailed;
-  }
+  if (!result.made && result.cancelled) return out_of_time();
+  if (!result.made)
+    throw InputError(arguments.target +
+                     ": no grid that was tried has the topology of the target's regions; ask for more --cells");
   const RegionTemplate& made = *result.made;
   VolumeMesh mesh = arguments.options.pillow ? pillow_regions(made.mesh) : made.mesh;
   add_interface_groups(mesh);
@@ -105,14 +110,11 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
     return auto_templates(target, options);
   });
   if (result.cancelled && interrupted()) return kInterrupted;
-  if (result.cancelled) {
-    std::cerr << "subvol: the time limit was reached before a template was made\n";
-    return kNotConverged;
-  }
+  if (result.cancelled) return out_of_time();
   if (result.templates.empty()) {
-    std::cerr << "subvol: " << why_no_grid(diagnose(target, interrupted), arguments.options.cells, result.wanted)
-              << '\n';
-    return interrupted() ? kInterrupted : kFailed;
+    const SurfaceDiagnosis diagnosis = diagnose(target, interrupted);
+    if (interrupted()) return kInterrupted;
+    throw InputError(arguments.target + ": " + why_no_grid(diagnosis, arguments.options.cells, result.wanted));
   }
   const AutoTemplate& made = result.templates.front();
   const bool as_asked = made.cells_asked == arguments.options.cells;
@@ -162,7 +164,8 @@ void add_template_auto(CLI::App& group, Action& action) {
                    "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
-  verb->footer(R"(Exit status 4: so many cells cannot carry the topology; the template has more.
+  verb->footer(
+      R"(Exit status 4: so many cells cannot carry the topology; the template has more. Status 3: no grid that was tried can.
 
 Example:
   subvol template auto bone.off --cells 300 -o bone_template.mesh)");

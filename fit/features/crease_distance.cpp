@@ -65,9 +65,10 @@ CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3
                                std::span<const CreaseSegment> segments, double diagonal,
                                const FeatureCurves* followed) {
   if (!(diagonal > 0)) throw InputError("crease_distance: diagonal must be positive");
-  check_segments(segments, points.size(), curves.curves.size());
+  const std::vector<FeatureCurve>& parts = followed ? followed->curves : curves.curves;
+  check_segments(segments, points.size(), parts.size());
   const double spacing = diagonal / 1000, percent = 100 / diagonal;
-  std::vector<std::vector<CreaseSegment>> by_curve(curves.curves.size());
+  std::vector<std::vector<CreaseSegment>> by_curve(parts.size());
   CreaseDistance result;
   for (const CreaseSegment& s : segments) {
     result.crease_length_percent += percent * (points[s.ends[1]] - points[s.ends[0]]).norm();
@@ -76,21 +77,21 @@ CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3
   const std::optional<ClosestPoint> any = crease_tree(points, segments);
   Sum from_target, to_target;
   double within = 0;
-  for (std::size_t c = 0; c < curves.curves.size(); ++c) {
-    const FeatureCurve& curve = curves.curves[c];
-    const std::optional<ClosestPoint> own = crease_tree(points, by_curve[c]);
+  result.num_curves = curves.curves.size();
+  for (const FeatureCurve& curve : curves.curves) {
+    result.target_length_percent += percent * curve.length();
     sample_polyline(curve.points, spacing, [&](const Vec3& y, double length) {
       if (any && any->closest(y).distance * percent <= kSharpPercent) within += length;
     });
-    ++result.num_curves;
-    result.target_length_percent += percent * curve.length();
+  }
+  for (std::size_t c = 0; c < parts.size(); ++c) {
+    const std::optional<ClosestPoint> own = crease_tree(points, by_curve[c]);
     if (!own) continue;
-    const FeatureCurve& part = followed ? followed->curves[c] : curve;
-    ++result.num_followed;
-    result.followed_length_percent += percent * part.length();
-    sample_polyline(part.points, spacing,
+    if (c < curves.curves.size()) ++result.num_followed;
+    result.followed_length_percent += percent * parts[c].length();
+    sample_polyline(parts[c].points, spacing,
                     [&](const Vec3& y, double length) { from_target.add(y, own->closest(y).distance, length); });
-    const ClosestPoint tree = polyline_tree(part.points);
+    const ClosestPoint tree = polyline_tree(parts[c].points);
     for (const CreaseSegment& s : by_curve[c])
       sample_segment(points[s.ends[0]], points[s.ends[1]], spacing,
                      [&](const Vec3& x, double length) { to_target.add(x, tree.closest(x).distance, length); });

@@ -36,8 +36,8 @@ inline constexpr double kSharpPercent = 0.1;
 ///
 /// points    ends of the segments: finite positions. Points and curves that segments name must exist, else InputError.
 /// diagonal  100 percent, > 0, else InputError. Deterministic. Cost: about 1 us a sample.
-/// followed  if not null, the same curves, each as far as its segments can follow it: its distances and its length
-///           are those of followed curves.
+/// followed  if not null, the curves that segments name: those above, each as far as it can be followed, and more parts
+///           of them after that. Distances and lengths of followed curves are those of these.
 CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3> points,
                                std::span<const CreaseSegment> segments, double diagonal,
                                const FeatureCurves* followed = nullptr);

@@ -60,15 +60,13 @@ bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& featu
                          std::span<const double> faults, RoutingOptions& options) {
   require_sizes(patched, features, faults, options);
   const auto curves = curves_at_fault(patched, features, faults);
-  bool any_makeshift = false;
+  bool any_joined = false;
   for (const auto& [fault, c] : curves) {
-    const bool is_makeshift = std::ranges::binary_search(routing.joined, c) ||
-                              std::ranges::binary_search(routing.parts, c, {}, &FollowedPart::curve);
-    if (options.not_joined[c] || !is_makeshift) continue;
+    if (options.not_joined[c] || !std::ranges::binary_search(routing.joined, c)) continue;
     options.not_joined[c] = 1;
-    any_makeshift = true;
+    any_joined = true;
   }
-  if (any_makeshift) return true;
+  if (any_joined) return true;
   const std::size_t count = curves.empty() ? 0 : std::max<std::size_t>(1, curves.size() / kOneIn);
   for (const auto& [fault, c] : std::span(curves).first(count)) options.excluded[c] = 1;
   return count > 0;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 namespace subvol::internal {
@@ -219,46 +218,17 @@ std::optional<CurveSearch::Found> CurveSearch::find(Index c, const Occupied& occ
   return curves_[c].closed() ? find_on_one_side(c, occupied) : std::nullopt;
 }
 
-/// Returns the parts of a curve that `find_part` may return, from one place to another, the longest first.
-std::vector<std::pair<double, double>> CurveSearch::parts_to_try(Index c) const {
-  constexpr std::array kLeftOut = {0.0, 1.0, 2.0, 3.0, 4.5, 6.0};  // at one end, in units of h
-  constexpr double kLeastPart = 0.5, kLeastLength = 3;             // of the curve; in units of h
-  constexpr int kMostPlaces = 16;                                  // at which a closed curve is cut
-  const double h = h_[c], length = curves_[c].length();
-  std::vector<std::pair<double, double>> parts;
-  const auto add = [&](double from, double to) {
-    if (to - from >= std::max(kLeastPart * length, kLeastLength * h)) parts.push_back({from, to});
-  };
-  if (curves_[c].closed()) {
-    const int places = static_cast<int>(std::min<double>(kMostPlaces, length / h));
-    for (int place = 0; place < places; ++place)
-      for (const double end : kLeftOut) {
-        const double from = std::fmod(length * place / places + end * h, length);
-        if (end > 0) add(from, from + length - 2 * end * h);
-      }
-  } else {
-    for (const double front : kLeftOut)
-      for (const double back : kLeftOut) add(front * h, length - back * h);
-  }
-  std::ranges::stable_sort(parts, std::greater{}, [](const auto& part) { return part.second - part.first; });
-  return parts;
-}
-
-std::optional<CurveSearch::FoundPart> CurveSearch::find_part(Index c, const Occupied& occupied) {
+std::vector<Index> CurveSearch::find_part(Index c, double from, double to, const Occupied& occupied) const {
   const FeatureCurve& curve = curves_[c];
-  if (!(h_[c] > 0)) return std::nullopt;
-  for (const auto& [from, to] : parts_to_try(c)) {
-    if (is_cancelled()) return std::nullopt;
-    const std::vector<Vec3> points = points_between(curve, from, to);
-    const bool has_front = !curve.closed() && from == 0, has_back = !curve.closed() && to == curve.length();
-    Course course;
-    course.anchors = {{points.front(), has_front ? corners_.vertex_of(curve.vertices.front()) : kNoIndex},
-                      {points.back(), has_back ? corners_.vertex_of(curve.vertices.back()) : kNoIndex}};
-    course.legs.push_back(walk_along(c, points));
-    if (auto found = judged(path_on(course, c, occupied), c, points, kFollowDistance))
-      return FoundPart{std::move(found->path), from, to};
-  }
-  return std::nullopt;
+  if (!(graph_.edge_length() > 0) || is_cancelled()) return {};
+  const std::vector<Vec3> points = points_between(curve, from, to);
+  const bool has_front = !curve.closed() && from == 0, has_back = !curve.closed() && to == curve.length();
+  Course course;
+  course.anchors = {{points.front(), has_front ? corners_.vertex_of(curve.vertices.front()) : kNoIndex},
+                    {points.back(), has_back ? corners_.vertex_of(curve.vertices.back()) : kNoIndex}};
+  course.legs.push_back(walk_along(c, points));
+  auto found = judged(path_on(course, c, occupied), c, points, kFollowDistance);
+  return found ? std::move(found->path) : std::vector<Index>();
 }
 
 CurveSearch::Straying::Straying(const CurveSearch& search, Index c, double most)

@@ -41,15 +41,9 @@ class CurveSearch {
   /// Looks for a path of a curve that touches nothing occupied but its corners.
   std::optional<Found> find(Index c, const Occupied& occupied);
 
-  /// A path along a part of a curve, between two places given by arc length, as for `points_between`.
-  struct FoundPart {
-    std::vector<Index> path;
-    double from, to;
-  };
-  /// Looks for a path along a curve that may leave out some of it, as little as possible: at its ends, at most 6 h at
-  /// each, or in one place, at most 12 h, if it is closed; and at most half of the curve. The path is at least 3 h
-  /// long, and ends at any free vertex where it leaves something out or where a corner has no vertex.
-  std::optional<FoundPart> find_part(Index c, const Occupied& occupied);
+  /// Looks for a path along a part of a curve (`points_between`). It ends at any free vertex nearby where the curve
+  /// goes on or a corner has no vertex. Returns no vertices if there is none.
+  std::vector<Index> find_part(Index c, double from, double to, const Occupied& occupied) const;
 
   /// Looks for paths of an open curve between two vertices that may stray from it by up to `most`, in units of h.
   class Straying {
@@ -91,7 +85,6 @@ class CurveSearch {
   std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied,
                              std::span<const Index> allowed = {}) const;
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied);
-  std::vector<std::pair<double, double>> parts_to_try(Index c) const;
   bool is_cancelled() const { return cancelled_ && cancelled_(); }
   std::optional<Found> judged(std::vector<Index> path, Index c, std::span<const Vec3> curve, double most) const;
 

@@ -20,9 +20,9 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   layout.pads = add_pads(layout.patched, features);
   layout.caps = quality_caps(layout.patched, features);
   layout.tagged_mesh = layout.patched.mesh;
-  layout.creases = FollowedCreases(followed_parts(near_target, features, layout.routing), layout.patched.paths,
-                                   layout.tagged_mesh);
-  for (const CreasePath& path : layout.patched.paths)
+  const std::vector<CreasePath> paths = paths_of_parts(layout.patched.paths, features.curves.curves.size());
+  layout.creases = FollowedCreases(followed_parts(near_target, features, layout.routing), paths, layout.tagged_mesh);
+  for (const CreasePath& path : paths)
     for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
       layout.segments.push_back({{path.vertices[i], path.vertices[i + 1]}, path.curve});
   const MeshTopology topology(layout.patched.mesh);

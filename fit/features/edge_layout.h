@@ -22,7 +22,7 @@ struct EdgeLayout {
   PadReport pads;
   QualityCaps caps;
   FollowedCreases creases;            ///< of the patched mesh
-  std::vector<CreaseSegment> segments;  ///< edges of the paths between the mesh's vertices, and the curves they follow
+  std::vector<CreaseSegment> segments;  ///< edges of the paths, and the curves of `creases` that they follow
   std::vector<Index> group_of_face;   ///< of each face of the mesh, by `MeshTopology`; 0 for faces inside
   std::vector<Index> group_of_triangle;  ///< of each triangle of the target
 

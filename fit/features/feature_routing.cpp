@@ -113,33 +113,32 @@ class Router {
     std::vector<Index> lost = lost_by_length();
     std::ranges::reverse(lost);
     for (const Index c : lost) {
-      if (!joinable_[c]) continue;
-      auto found = search_->find_part(c, occupied);
-      if (!found) continue;
-      lost_.push_back(explained(c));
-      occupied.add(graph_, found->path);
-      best_[c] = std::move(found->path);
-      parts_.push_back({c, found->from, found->to});
+      std::vector<PartPath> found = find_parts(*search_, graph_, features_.curves, c, occupied);
+      for (const PartPath& part : found) occupied.add(graph_, part.path);
+      parts_.insert_or_assign(c, std::move(found));
     }
-    std::ranges::sort(parts_, {}, &FollowedPart::curve);
   }
 
   FeatureRouting result() const {
     FeatureRouting routing;
-    routing.parts = parts_;
     for (std::size_t i = 0; i < curves_.size(); ++i) {
       const auto c = static_cast<Index>(i);
-      if (best_[c].empty()) {
+      const auto parts = parts_.find(c);
+      if (parts != parts_.end() && !parts->second.empty()) {
+        for (const auto& [part, path] : parts->second) {
+          routing.paths.push_back({c, path});
+          routing.parts.push_back(part);
+          for (int end = 0; end < 2; ++end) note_corner(c, end, path, routing.corners);
+        }
+        routing.unfollowed.push_back(left_out(c, parts->second));
+      } else if (best_[c].empty()) {
         routing.unfollowed.push_back(explained(c));
-        continue;
+      } else {
+        routing.paths.push_back({c, best_[c]});
+        const bool front = note_corner(c, 0, best_[c], routing.corners);
+        const bool back = note_corner(c, 1, best_[c], routing.corners);
+        if (!front || !back) routing.joined.push_back(c);
       }
-      routing.paths.push_back({c, best_[c]});
-      const bool front = note_corner(c, 0, routing.corners), back = note_corner(c, 1, routing.corners);
-      if (const auto part = std::ranges::lower_bound(parts_, c, {}, &FollowedPart::curve);
-          part != parts_.end() && part->curve == c)
-        routing.unfollowed.push_back(left_out(*part));
-      else if (!front || !back)
-        routing.joined.push_back(c);
     }
     std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
     routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
@@ -389,26 +388,36 @@ class Router {
     return std::ssize(graph_.edges_at(v)) < features_.curves.corner_edges[at - features_.curves.corners.begin()];
   }
 
-  /// Records the corner at one end of a path. Returns false if the path joins another one there.
-  bool note_corner(Index c, int end, std::vector<PlacedCorner>& corners) const {
-    const Index corner = corner_at(c, end), v = end == 0 ? best_[c].front() : best_[c].back();
+  /// Records the corner at one end of a path. Returns false if the path ends elsewhere.
+  bool note_corner(Index c, int end, std::span<const Index> path, std::vector<PlacedCorner>& corners) const {
+    const Index corner = corner_at(c, end), v = end == 0 ? path.front() : path.back();
     if (features_.curves.is_corner(corner) && vertex_of(corner) == v) corners.push_back({corner, v});
     return curves_[c].closed() || vertex_of(corner) == v;
   }
 
-  /// Returns what the path of a part leaves out.
-  UnfollowedCurve left_out(const FollowedPart& part) const {
-    UnfollowedCurve lost = *std::ranges::find(lost_, part.curve, &UnfollowedCurve::curve);
-    const FeatureCurve& curve = curves_[part.curve];
+  /// Returns what the paths along parts of a curve leave out.
+  UnfollowedCurve left_out(Index c, std::span<const PartPath> parts) const {
+    UnfollowedCurve lost = explained(c);
+    const FeatureCurve& curve = curves_[c];
     const double length = curve.length();
-    lost.length = length - (part.to - part.from);
-    if (curve.closed()) {
-      const double from = std::fmod(part.to, length);
-      lost.points = points_between(curve, from, from + lost.length);
-    } else {
-      const bool is_front = part.from > length - part.to;
-      lost.points = is_front ? points_between(curve, 0, part.from) : points_between(curve, part.to, length);
-    }
+    lost.points.clear();
+    lost.length = 0;
+    double longest = 0;
+    const auto leave_out = [&](double from, double to) {
+      lost.length += to - from;
+      if (to - from <= longest) return;
+      longest = to - from;
+      lost.points = points_between(curve, from, to);
+    };
+    const double wrapped = std::max(0.0, parts.back().part.to - length);  // of a closed curve, by its last part
+    if (!curve.closed()) leave_out(0, parts.front().part.from);
+    for (std::size_t i = 0; i + 1 < parts.size(); ++i) leave_out(parts[i].part.to, parts[i + 1].part.from);
+    if (curve.closed())
+      leave_out(parts.back().part.to - (wrapped > 0 ? length : 0),
+                parts.front().part.from + (wrapped > 0 ? 0 : length));
+    else
+      leave_out(parts.back().part.to, length);
+    if (lost.points.empty()) return lost;
     const ArcLength arc(lost.points);
     lost.place = arc.at(arc.length() / 2);
     return lost;
@@ -427,8 +436,7 @@ class Router {
   Paths best_;
   double best_length_ = 0;
   std::vector<Index> alone_;  ///< curves that have a path if no other one has
-  std::vector<FollowedPart> parts_;
-  std::vector<UnfollowedCurve> lost_;  ///< the curves of parts_, as they were before
+  std::map<Index, std::vector<PartPath>> parts_;  ///< of the curves that were tried in parts
 };
 
 }  // namespace
@@ -455,8 +463,10 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
   double all = 0, routed = 0;
   for (const FeatureCurve& curve : curves.curves) all += curve.length();
-  for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
-  for (const FollowedPart& part : routing.parts) routed -= curves.curves[part.curve].length() - (part.to - part.from);
+  for (const CreasePath& path : routing.paths)
+    if (!std::ranges::binary_search(routing.parts, path.curve, {}, &FollowedPart::curve))
+      routed += curves.curves[path.curve].length();
+  for (const FollowedPart& part : routing.parts) routed += part.to - part.from;
   return all > 0 ? routed / all : 1;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/fit/features/crease_paths.h"
+#include "subvol/fit/features/curve_parts.h"
 #include "subvol/fit/features/not_followed.h"
 #include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -23,12 +24,6 @@ struct UnfollowedCurve {
   double length;             ///< of the curve, or of all that is left out
 };
 
-/// The part of a curve that a path follows, from one place to another (`points_between`).
-struct FollowedPart {
-  Index curve;
-  double from, to;
-};
-
 /// A corner of the target, and the boundary vertex that represents it.
 struct PlacedCorner {
   Index corner;  ///< a vertex of the target, in `FeatureCurves::corners`
@@ -38,8 +33,7 @@ struct PlacedCorner {
 
 struct RoutingOptions {
   std::vector<std::uint8_t> excluded;    ///< one entry per curve, not zero for curves to leave alone; empty: none
-  /// Likewise for curves whose path must lead from corner to corner: it may neither join another one nor be a part.
-  std::vector<std::uint8_t> not_joined;
+  std::vector<std::uint8_t> not_joined;  ///< likewise for curves that may not join the path of another one
   /// True: paths run along all sheets of the mesh, its boundary and the interfaces between regions. Numbers of cells do
   /// not matter then.
   bool on_sheets = false;
@@ -53,10 +47,11 @@ struct RoutingOptions {
 };
 
 struct FeatureRouting {
-  std::vector<CreasePath> paths;            ///< at most one per curve, ascending by curve
+  std::vector<CreasePath> paths;            ///< ascending by curve; several only along parts of it, in its order
   std::vector<PlacedCorner> corners;        ///< those at which a path ends, ascending by vertex
   std::vector<Index> joined;                ///< curves whose path ends inside the path of another one; ascending
-  std::vector<FollowedPart> parts;          ///< of the curves that are followed in part; ascending by curve
+  std::vector<FollowedPart>
+      parts;  ///< of the curves that are followed in part: one for each of their paths, in the same order
   std::vector<UnfollowedCurve> unfollowed;  ///< those followed in part are among them; ascending by curve
 };
 
@@ -90,9 +85,8 @@ struct FeatureRouting {
 /// If some are lost then, all is done again with corners moved out of the way: vertices of corners on the path of
 /// another curve that finds no other, the longest curves first; a corner that cannot move shares the vertex of the
 /// curve's end if both belong to one cluster (`corner_clusters`). It is done once more with a shared vertex for each
-/// cluster at the ends of lost curves. The greatest length counts. Curves that are still lost are followed in part:
-/// the path may leave out up to 6 h at each end, of a closed curve up to 12 h in one place, and half of the curve; it
-/// must be 3 h long. With `on_sheets`, there are no such parts.
+/// cluster at the ends of lost curves. The greatest length counts. Curves that are still lost are followed in
+/// parts (`find_parts`), the longest curves first. With `on_sheets`, there are no such parts.
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.

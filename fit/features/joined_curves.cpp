@@ -58,11 +58,16 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
     curve.vertices.resize(curve.points.size(), last);
     curve.vertices.back() = last;
   };
-  for (const FollowedPart& part : routing.parts) {
-    FeatureCurve& curve = result.curves[part.curve];
-    curve.points = points_between(features.curves.curves[part.curve], part.from, part.to);
+  for (std::size_t i = 0; i < routing.parts.size(); ++i) {
+    const FollowedPart& part = routing.parts[i];
+    const FeatureCurve& whole = features.curves.curves[part.curve];
+    FeatureCurve curve{whole.vertices, points_between(whole, part.from, part.to)};
     if (curve.closed()) curve.vertices.pop_back();  // the part is open
     number_vertices(curve);
+    if (i > 0 && routing.parts[i - 1].curve == part.curve)
+      result.curves.push_back(std::move(curve));
+    else
+      result.curves[part.curve] = std::move(curve);
   }
   for (Index c : routing.joined) {
     const auto path = std::ranges::lower_bound(routing.paths, c, {}, &CreasePath::curve);
@@ -80,6 +85,14 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
     number_vertices(curve);
   }
   return result;
+}
+
+std::vector<CreasePath> paths_of_parts(std::vector<CreasePath> paths, std::size_t num_curves) {
+  auto next = static_cast<Index>(num_curves);
+  Index before = kNoIndex;
+  for (CreasePath& path : paths)
+    if (path.curve == std::exchange(before, path.curve)) path.curve = next++;
+  return paths;
 }
 
 }  // namespace subvol::internal

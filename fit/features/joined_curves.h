@@ -9,9 +9,13 @@
 namespace subvol::internal {
 
 /// Returns the curves as far as their paths can follow them: the curve of a joined path starts on the curve whose path
-/// it joins, as far from the corner as the two paths part, and goes on along its own; curves of `FeatureRouting::parts`
-/// are cut to these; all others are unchanged.
-/// mesh, features, routing  as for and from `route_features`.
+/// it joins, as far from the corner as the two paths part, and goes on along its own; a curve of
+/// `FeatureRouting::parts` is cut to the first of them, and its other parts are added as curves at the end, in the
+/// order of their paths. mesh, features, routing  as for and from `route_features`.
 FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing);
+
+/// Renames the curves of a routing's paths to those that `followed_parts` returns.
+/// paths  of the routing, in its order.  num_curves  of all features.
+std::vector<CreasePath> paths_of_parts(std::vector<CreasePath> paths, std::size_t num_curves);
 
 }  // namespace subvol::internal

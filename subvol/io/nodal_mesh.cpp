@@ -146,6 +146,8 @@ NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, co
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
     mesh.references.clear();
   normalize(mesh.face_groups);
+  for (auto* groups : {&mesh.face_groups.groups, &mesh.regions, &mesh.shells.face_groups.groups})
+    make_names_utf8(*groups);
   if (mesh.max_order() > 1 && std::ranges::find(mesh.kinds, CellKind::pyramid) != mesh.kinds.end())
     throw InputError(path.string() + ": curved cells beside pyramids: " + kNoCurvedPyramids);
   return mesh;

@@ -202,6 +202,7 @@ PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* wa
   Remarks remarks(path.string(), warnings);
   ParsedSurface parsed = parser->parse(path.string(), read_file(path));
   remarks.tell(parsed.warnings);
+  make_names_utf8(parsed.mesh.face_groups.groups);
   return sound_polygons(std::move(parsed.mesh), path.string(), warnings);
 }
 

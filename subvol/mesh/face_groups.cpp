@@ -25,6 +25,15 @@ std::size_t utf8_size(std::string_view text) {
   return is_overlong || is_beyond ? 0 : size;
 }
 
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t size = utf8_size(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
 }  // namespace
 
 FaceKey face_key(std::span<const Index> corners) {
@@ -34,6 +43,23 @@ FaceKey face_key(std::span<const Index> corners) {
   std::sort(key.begin(), key.end());
   if (corners.size() < key.size()) key.back() = kNoIndex;
   return key;
+}
+
+void make_names_utf8(std::vector<Group>& groups) {
+  for (Group& group : groups) {
+    if (is_utf8(group.name)) continue;
+    std::string name;
+    for (const char c : group.name) {
+      const auto code = static_cast<unsigned char>(c);
+      if (code < 0x80) {
+        name += c;
+      } else {
+        name += static_cast<char>(0xC0 | (code >> 6));
+        name += static_cast<char>(0x80 | (code & 0x3F));
+      }
+    }
+    group.name = std::move(name);
+  }
 }
 
 void normalize(VolumeFaceGroups& groups) {

@@ -23,6 +23,10 @@ struct Group {
   friend bool operator==(const Group&, const Group&) = default;
 };
 
+/// Rewrites names that are not UTF-8 as if they were Latin-1, as older programs write them: most formats, and the
+/// programs that read them, expect UTF-8.
+void make_names_utf8(std::vector<Group>& groups);
+
 /// The groups of a surface's faces. A face is in one group or in none. Without groups, both lists are empty.
 struct FaceGroups {
   std::vector<Group> groups;    ///< no two have the same number

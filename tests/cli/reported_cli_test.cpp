@@ -140,7 +140,7 @@ TEST_CASE("Reported surfaces are diagnosed, repaired, or refused with the place 
     CHECK(has(run.err, word));
   }
   const Run gap = place.run("template auto " + *inputs + "39-gap0.002.off -o b.mesh");
-  CHECK(gap.status == 1);
+  CHECK(gap.status == 3);
   CHECK((has(gap.err, "the thinnest gap is 0.002 wide") && has(gap.err, "thinner than a cell")));
   const Run regions = place.run("template auto " + *inputs + "39-outward_wrong.off -o b.mesh");
   CHECK(regions.status == 0);

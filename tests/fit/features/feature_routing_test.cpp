@@ -226,9 +226,39 @@ TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
   for (const FeatureCurve& curve : features.curves.curves) all += curve.length();
   for (const CreasePath& path : routing.paths) whole += features.curves.curves[path.curve].length();
   CHECK(routed_share(routing, features.curves) < whole / all);
-  RoutingOptions options;
-  options.not_joined.assign(12, 1);
-  CHECK(route_features(mesh, features, options).parts.empty());
+}
+
+TEST_CASE("an edge that is blocked in the middle is followed on both sides") {
+  const TriangleMesh target = cube_surface(2, false);
+  VolumeMesh mesh = centered_lattice(16);
+  const SignedFeatures features = features_of(target);
+  const double h = 2.0 / 16;
+  for (Vec3& p : mesh.positions)  // a notch across the edge at x = z = 1
+    if (p.x() > 0.5 && p.z() > 0.5 && std::abs(p.y()) < 1.5 * h) p -= Vec3(2 * h, 0, 2 * h);
+  const FeatureRouting routing = route_features(mesh, features);
+  CHECK(routing.paths.size() == 13);
+  REQUIRE(routing.parts.size() == 2);
+  REQUIRE(routing.unfollowed.size() == 1);
+  const Index c = routing.parts[0].curve;
+  CHECK(routing.parts[1].curve == c);
+  CHECK(routing.parts[0].from == 0);
+  CHECK(routing.parts[0].to < routing.parts[1].from);
+  CHECK(routing.parts[1].to == Approx(2));
+  const UnfollowedCurve& lost = routing.unfollowed[0];
+  CHECK(lost.curve == c);
+  CHECK(std::abs(lost.place.y()) < 2 * h);
+  CHECK(lost.length == Approx(routing.parts[1].from - routing.parts[0].to));
+  require_apart(routing);
+  const FeatureCurves followed = followed_parts(mesh, features, routing);
+  REQUIRE(followed.curves.size() == 13);
+  const std::vector<CreasePath> paths = paths_of_parts(routing.paths, 12);
+  std::set<Index> names;
+  for (const CreasePath& path : paths) {
+    names.insert(path.curve);
+    const ClosestPoint tree = polyline_tree(followed.curves[path.curve].points);
+    for (const Index v : path.vertices) CHECK(tree.closest(mesh.positions[v]).distance <= 1.1 * h * 1.3);
+  }
+  CHECK(names.size() == 13);
 }
 
 TEST_CASE("a closed curve that is blocked in one place is followed around the rest") {

@@ -47,6 +47,16 @@ void check_floor_and_roof(const VolumeMesh& mesh, double height) {
 
 }  // namespace
 
+TEST_CASE("names that are not UTF-8 are read as Latin-1") {
+  std::vector<Group> groups = {{"wall", 1, 2}, {"d\xC3\xBCse", 2, 2}, {"d\xFCse", 3, 2}, {"\xE9", 4, 2}, {"", 5, 2}};
+  make_names_utf8(groups);
+  CHECK(groups[0].name == "wall");
+  CHECK(groups[1].name == "d\xC3\xBCse");
+  CHECK(groups[2].name == "d\xC3\xBCse");
+  CHECK(groups[3].name == "\xC3\xA9");
+  CHECK(groups[4].name.empty());
+}
+
 TEST_CASE("a face is found by its corners in any order") {
   const VolumeMesh mesh = with_floor_and_roof(lattice(2, 1, 1), 1);
   const std::array<Index, 4> floor{3, 1, 0, 2}, wall{0, 1, 5, 4};
