@@ -78,7 +78,7 @@ struct AutomaticFitOptions {
   bool keep_states = false;           ///< fills AutomaticFitResult::states
 };
 
-/// A sharp edge of the target that no edges of the mesh follow, or not to its ends.
+/// A sharp edge of the target that no edges of the mesh follow, or not all along.
 struct MissedEdge {
   NotFollowed reason;
   Vec3 place;                 ///< a point that is not followed, in the target's coordinates
@@ -149,7 +149,7 @@ struct AutomaticFitResult {
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
 ///         + 5 (1 - least share of the quality that a cell reaches) + 5 max(0, 1 - least scaled Jacobian / 0.3)
 ///         + 3 (1 - share of the edges within 0.1 %)
-///         + 0.6 if edges longer than 10 % are not followed, but for acute ones, or if a feature is lost
+///         + 1.5 if edges longer than 10 % are not followed, but for acute ones, or if a feature is lost
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.

@@ -148,7 +148,7 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
   if (missed.empty()) return;
   const MissedEdge& longest = missed.front();
   report.warnings.push_back(
-      formatted("%zu of %zu %s are not followed, or not to their ends; most is left out, %.3g %% of the diagonal, at "
+      formatted("%zu of %zu %s are not followed, or not all along; the most is left out, %.3g %% of the diagonal, at "
                 "(%.6g, %.6g, %.6g): %s",
                 missed.size(), num_curves, name, longest.length_percent, longest.place.x(), longest.place.y(),
                 longest.place.z(), to_string(longest.reason).c_str()));

@@ -28,6 +28,7 @@ CornerPlacement::CornerPlacement(const RoutingGraph& graph, const SignedFeatures
       h_(graph.edge_length()),
       clusters_(corner_clusters(graph, features, followed, vanishing)),
       taken_(graph.num_vertices(), 0) {
+  for (const auto& [corner, cluster] : clusters_) members_[cluster].push_back(corner);
   find_needs(features, followed);
   place();
 }
@@ -43,9 +44,8 @@ void CornerPlacement::find_needs(const SignedFeatures& features, std::span<const
     for (int end = 0; end < 2; ++end) {
       const Index corner = end == 0 ? curves[c].vertices.front() : curves[c].vertices.back();
       if (!followed[c] || !std::ranges::binary_search(features.curves.corners, corner)) continue;
-      Needs& needs = needs_[representative(corner)];
-      if (representative(corner) == corner)
-        needs.position = end == 0 ? curves[c].points.front() : curves[c].points.back();
+      Needs& needs = needs_[corner];
+      needs.position = end == 0 ? curves[c].points.front() : curves[c].points.back();
       ++needs.curves;
       needs.convex += features.is_convex(static_cast<Index>(c));
     }
@@ -129,18 +129,15 @@ bool CornerPlacement::share_all(Index corner) {
   const auto cluster = clusters_.find(corner);
   if (cluster == clusters_.end()) return false;
   Index main = kNoIndex;
-  std::vector<Index> others;
-  for (const auto& [member, number] : clusters_) {
-    if (number != cluster->second || representative(member) != member || vertex_of(member) == kNoIndex) continue;
-    if (main != kNoIndex && needs_.at(member).curves <= needs_.at(main).curves) {
-      others.push_back(member);
-      continue;
-    }
-    if (main != kNoIndex) others.push_back(main);
-    main = member;
+  for (const Index member : members_.at(cluster->second)) {
+    const auto needs = needs_.find(member);
+    const bool has_place = needs != needs_.end() && vertex_of(member) != kNoIndex;
+    if (has_place && (main == kNoIndex || needs->second.curves > needs_.at(main).curves)) main = member;
   }
-  for (const Index other : others) share(other, main);
-  return !others.empty();
+  bool any = false;
+  for (const Index member : members_.at(cluster->second))
+    if (main != kNoIndex && member != main && needs_.contains(member)) any |= share(member, main);
+  return any;
 }
 
 }  // namespace subvol::internal

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,14 +42,17 @@ std::vector<double> vertex_faults(const VolumeMesh& mesh, std::span<const double
 
 /// Returns the curves at fault with their faults, the worst first.
 std::vector<std::pair<double, Index>> curves_at_fault(const PatchedMesh& patched, const SignedFeatures& features,
-                                                      std::span<const double> faults) {
+                                                      const FeatureRouting& routing, std::span<const double> faults) {
   const std::vector<double> at_vertex = vertex_faults(patched.mesh, faults);
+  std::map<Index, double> sums, parts;  // by curve; length of what is followed, of curves in parts
+  for (const CreasePath& path : patched.paths)
+    for (Index v : path.vertices) sums[path.curve] += at_vertex[v];
+  for (const FollowedPart& part : routing.parts) parts[part.curve] += part.to - part.from;
   std::vector<std::pair<double, Index>> curves;
-  for (const CreasePath& path : patched.paths) {
-    double sum = 0;
-    for (Index v : path.vertices) sum += at_vertex[v];
-    const double length = features.curves.curves[path.curve].length();
-    if (sum > 0 && length > 0) curves.push_back({sum / length, path.curve});
+  for (const auto& [c, sum] : sums) {
+    const auto part = parts.find(c);
+    const double length = part != parts.end() ? part->second : features.curves.curves[c].length();
+    if (sum > 0 && length > 0) curves.push_back({sum / length, c});
   }
   std::ranges::stable_sort(curves, [](const auto& a, const auto& b) { return a.first > b.first; });
   return curves;
@@ -59,7 +63,7 @@ std::vector<std::pair<double, Index>> curves_at_fault(const PatchedMesh& patched
 bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& features, const FeatureRouting& routing,
                          std::span<const double> faults, RoutingOptions& options) {
   require_sizes(patched, features, faults, options);
-  const auto curves = curves_at_fault(patched, features, faults);
+  const auto curves = curves_at_fault(patched, features, routing, faults);
   bool any_joined = false;
   for (const auto& [fault, c] : curves) {
     if (options.not_joined[c] || !std::ranges::binary_search(routing.joined, c)) continue;

@@ -13,7 +13,8 @@ namespace subvol::internal {
 namespace {
 
 // Lengths are in units of h.
-constexpr double kLeastPart = 3;   // of a part
+constexpr double kLeastPart = 3;     // of a part
+constexpr double kLeastGap = 1;      // between two parts
 constexpr double kLeastShare = 0.5;  // of the curve that all parts must follow
 
 /// A part of a curve, from one place to another.
@@ -38,24 +39,20 @@ std::vector<double> places_in(const Interval& all, double h) {
 class PartSearch {
  public:
   PartSearch(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurve& curve, Index c,
-             Occupied occupied)
-      : search_(search),
-        graph_(graph),
-        curve_(curve),
-        c_(c),
-        h_(search.edge_length(c)),
-        occupied_(std::move(occupied)) {}
+             const Occupied& occupied)
+      : search_(search), graph_(graph), curve_(curve), c_(c), h_(search.edge_length(c)), occupied_(occupied) {}
 
   std::vector<PartPath> run() {
     const double length = curve_.length();
-    if (!(h_ > 0)) return {};
     std::vector<Interval> left = {{0, length}};
     if (curve_.closed()) left = {cut_open()};
     while (!left.empty()) {
       const Interval all = left.back();
       left.pop_back();
       const std::optional<Interval> longest = longest_in(all);
-      if (longest) left.insert(left.end(), {{all.first, longest->first}, {longest->second, all.second}});
+      if (!longest) continue;
+      left.push_back({all.first, longest->first - kLeastGap * h_});
+      left.push_back({longest->second + kLeastGap * h_, all.second});
     }
     double followed = 0;
     for (PartPath& found : found_) {
@@ -91,20 +88,20 @@ class PartSearch {
     return std::nullopt;
   }
 
-  /// Finds the longest part of a closed curve, if there is one. Returns what is left.
+  /// Finds the longest part of a closed curve, if one is long enough. Returns what is left.
   Interval cut_open() {
-    constexpr double kMostPlaces = 16;
+    constexpr int kPlaces = 8;
     const double length = curve_.length();
-    const int places = static_cast<int>(std::min(kMostPlaces, length / h_));
     std::vector<Interval> parts;
-    for (int k = 0; k < places; ++k) {
-      const double from = length * k / places;
+    for (int k = 0; k < kPlaces; ++k) {
+      const double from = length * k / kPlaces;
       for (const double to : places_in({from, from + length}, h_))
-        if (to - from >= kLeastPart * h_ && to - from < length) parts.push_back({from, to});
+        if (to - from >= std::max(kLeastPart * h_, kLeastShare * length) && to - from < length)
+          parts.push_back({from, to});
     }
     std::ranges::stable_sort(parts, std::greater{}, length_of);
     for (const Interval& part : parts)
-      if (find(part)) return {part.second, part.first + length};
+      if (find(part)) return {part.second + kLeastGap * h_, part.first + length - kLeastGap * h_};
     return {0, 0};
   }
 
@@ -120,8 +117,10 @@ class PartSearch {
 }  // namespace
 
 std::vector<PartPath> find_parts(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurves& curves,
-                                 Index c, Occupied occupied) {
-  return PartSearch(search, graph, curves.curves[c], c, std::move(occupied)).run();
+                                 Index c, const Occupied& occupied) {
+  const double h = search.edge_length(c);
+  if (!(h > 0) || curves.curves[c].length() < kLeastPart * h) return {};
+  return PartSearch(search, graph, curves.curves[c], c, occupied).run();
 }
 
 }  // namespace subvol::internal

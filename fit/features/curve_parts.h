@@ -21,13 +21,14 @@ struct PartPath {
   std::vector<Index> path;
 };
 
-/// Looks for paths along parts of a curve that has none as a whole. The first part is as long as it can be; others are
-/// looked for in the same way in what it leaves out. Each is at least 3 h long.
+/// Looks for paths along parts of a curve that has none as a whole. The first part is as long as it can be, that of a
+/// closed curve at least half of it; others are looked for in the same way in what it leaves out, at least one h away.
+/// Each is at least 3 h long.
 ///
 /// search    for the curves of `curves`.  occupied  what the paths may not touch.
 /// returns   the parts in the order of the curve, the first place in [0, length); none if they are less than half of
 ///           the curve. Cost: up to some hundred short searches.
 std::vector<PartPath> find_parts(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurves& curves,
-                                 Index c, Occupied occupied);
+                                 Index c, const Occupied& occupied);
 
 }  // namespace subvol::internal

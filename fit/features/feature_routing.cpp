@@ -130,7 +130,8 @@ class Router {
           routing.parts.push_back(part);
           for (int end = 0; end < 2; ++end) note_corner(c, end, path, routing.corners);
         }
-        routing.unfollowed.push_back(left_out(c, parts->second));
+        if (UnfollowedCurve lost = left_out(c, parts->second); lost.length > 0)
+          routing.unfollowed.push_back(std::move(lost));
       } else if (best_[c].empty()) {
         routing.unfollowed.push_back(explained(c));
       } else {
@@ -140,7 +141,7 @@ class Router {
         if (!front || !back) routing.joined.push_back(c);
       }
     }
-    std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
+    std::ranges::sort(routing.corners, {}, [](const PlacedCorner& p) { return std::pair(p.vertex, p.corner); });
     routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
     return routing;
   }
@@ -376,12 +377,12 @@ class Router {
     if (curve.length() < h) return because(NotFollowed::shorter_than_cell, middle);
     if (!std::ranges::binary_search(alone_, c)) return because(NotFollowed::no_path_nearby, middle);
     for (int end = 0; end < 2; ++end)
-      if (is_crowded(corner_at(c, end)))
+      if (has_too_few_edges(corner_at(c, end)))
         return because(NotFollowed::too_many_edges_at_corner, end == 0 ? curve.points.front() : curve.points.back());
     return because(NotFollowed::lost_to_neighbor, middle);
   }
 
-  bool is_crowded(Index corner) const {
+  bool has_too_few_edges(Index corner) const {
     const Index v = vertex_of(corner);
     const auto at = std::ranges::lower_bound(features_.curves.corners, corner);
     if (v == kNoIndex || at == features_.curves.corners.end() || *at != corner) return false;
@@ -450,8 +451,11 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
     other->run();
     if (other->followed_length() > best->followed_length()) best = std::move(other);
   };
+  const auto is_cancelled = [&] { return options.cancelled && options.cancelled(); };
+  if (is_cancelled()) return best->result();
   if (auto cleared = std::make_unique<Router>(mesh, features, options); cleared->clear_ways())
     keep_if_longer(std::move(cleared));
+  if (is_cancelled()) return best->result();
   if (auto shared = std::make_unique<Router>(mesh, features, options); shared->share_ends(lost)) {
     shared->clear_ways();
     keep_if_longer(std::move(shared));

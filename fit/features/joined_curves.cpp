@@ -20,8 +20,7 @@ struct Junction {
   double share;
 };
 
-std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting& routing, Index joined, Index vertex,
-                                    Index corner) {
+std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting& routing, Index joined, Index vertex) {
   for (const CreasePath& path : routing.paths) {
     if (path.curve == joined) continue;
     const auto at = std::ranges::find(path.vertices, vertex);
@@ -30,8 +29,8 @@ std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting
     for (Index v : path.vertices) points.push_back(mesh.positions[v]);
     const double length = polyline_length(points);
     const double before = polyline_length(std::span(points).first(at - path.vertices.begin() + 1));
-    const auto corner_vertex = std::ranges::find(routing.corners, corner, &PlacedCorner::corner);
-    const bool at_front = corner_vertex == routing.corners.end() || corner_vertex->vertex == path.vertices.front();
+    // A path joins another one in the first half, seen from their corner.
+    const bool at_front = 2 * (at - path.vertices.begin()) < std::ssize(path.vertices);
     const double share = length > 0 ? before / length : 0;
     return Junction{path.curve, at_front, at_front ? share : 1 - share};
   }
@@ -76,7 +75,7 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
       const Index vertex = end == 0 ? path->vertices.front() : path->vertices.back();
       const Index corner = end == 0 ? curve.vertices.front() : curve.vertices.back();
       const bool at_corner = std::ranges::find(routing.corners, PlacedCorner{corner, vertex}) != routing.corners.end();
-      const auto junction = at_corner ? std::nullopt : junction_at(mesh, routing, c, vertex, corner);
+      const auto junction = at_corner ? std::nullopt : junction_at(mesh, routing, c, vertex);
       if (!junction) continue;
       if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
       start_at_junction(curve, features.curves.curves[junction->curve], *junction);

@@ -342,7 +342,7 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   };
   refuses("", 2, "subcommand");
   refuses("frobnicate", 2, "frobnicate");
-  refuses("optimize in.mesh -o out.mesh", 2, "there is no verb 'optimize'; did you mean optimize?");
+  refuses("optimise in.mesh -o out.mesh", 2, "there is no verb 'optimise'; did you mean optimize?");
   refuses("transmogrify", 2, "there is no verb 'transmogrify'; there are: fit");
   refuses("template splt in.mesh -o out.mesh", 2, "there is no verb 'template splt'; did you mean split?");
   refuses("template frobnicate", 2, "there are: auto");
