@@ -19,7 +19,7 @@ namespace subvol::internal {
 struct UnfollowedCurve {
   Index curve;
   NotFollowed reason;
-  Vec3 place;                ///< for a report: the corner that is at fault, or the middle of `points`
+  Vec3 place;                ///< for a report: the corner at fault if no path follows it, or the middle of `points`
   std::vector<Vec3> points;  ///< the curve, or the longest of the pieces that its path leaves out
   double length;             ///< of the curve, or of all that is left out
 };
@@ -50,8 +50,8 @@ struct FeatureRouting {
   std::vector<CreasePath> paths;            ///< ascending by curve; several only along parts of it, in its order
   std::vector<PlacedCorner> corners;        ///< those at which a path ends, ascending by vertex
   std::vector<Index> joined;                ///< curves whose path ends inside the path of another one; ascending
-  std::vector<FollowedPart>
-      parts;  ///< of the curves that are followed in part: one for each of their paths, in the same order
+  /// Of the curves that are followed in part: one for each of their paths, in the same order.
+  std::vector<FollowedPart> parts;
   std::vector<UnfollowedCurve> unfollowed;  ///< those followed in part are among them; ascending by curve
 };
 

@@ -91,7 +91,7 @@ TEST_CASE("A fit that was stopped within a minimization ends at the same bits", 
     options.log = log;
     return fit_subdivision_volume(sample.target, sample.template_mesh, options);
   };
-  // What a checkpoint held at each moment that a minimization was not over.
+  // This holds the checkpoint of each moment at which a minimization was not over.
   std::vector<std::vector<SolvedStage>> moments;
   StageLog whole;
   whole.on_add = [&] {
