@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/region_volumes.h"
 
+#include "subvol/base/dense_solve.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
-
-#include <Eigen/Dense>
 
 #include <algorithm>
 #include <array>
@@ -135,7 +134,7 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
     for (std::size_t v = 0; v < by_vertex.size(); ++v)
       for (const auto& [r, g] : by_vertex[v])
         for (const auto& [s, h] : by_vertex[v]) matrix(r, s) += g.dot(projectors[v] * h) / area[v];
-    const Eigen::VectorXd factors = matrix.completeOrthogonalDecomposition().solve(missing);
+    const Eigen::VectorXd factors = least_norm_solution(matrix, missing);
     if (!factors.allFinite()) break;
     for (std::size_t v = 0; v < by_vertex.size(); ++v) {
       if (by_vertex[v].empty()) continue;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/label_surface.h"
 
+#include "subvol/base/dense_solve.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/templates/voxel_labels.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
@@ -274,7 +275,7 @@ void LabelSheets::restore_volumes() {
         for (const int b : pair)
           if (a != kOutside && b != kOutside)
             matrix(a - 1, b - 1) += (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)];
-    const Eigen::VectorXd y = matrix.completeOrthogonalDecomposition().solve(missing);
+    const Eigen::VectorXd y = least_norm_solution(matrix, missing);
     // Normals of each sheet at each vertex, one after the other: at a curve, each sheet asks for its own move.
     std::vector<std::pair<std::pair<Index, Index>, Vec3>> normals;  // vertex, sheet
     for (const Face& face : faces_)
