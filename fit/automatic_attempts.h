@@ -8,6 +8,10 @@
 
 namespace subvol::internal {
 
+/// Portion of the work that is left, for forecasts: in the middle of a fit, the share that is done is then between a
+/// quarter and three quarters, whether the first attempt is the last or the second is.
+inline constexpr double kAttemptPortion = 0.62;
+
 /// One attempt of an automatic fit of one solid: a template of at most so many cells, and the number of times it is
 /// subdivided.
 struct AutomaticAttempt {
@@ -20,6 +24,7 @@ struct AutomaticAttempt {
   std::size_t template_cells;
   int levels;
   bool is_last_count = true;        ///< no attempt with more cells follows
+  double portion = kAttemptPortion;  ///< of the work that is left
   bool precedes_unrefined = false;  ///< an attempt follows whose template has as many cells as this result
 };
 

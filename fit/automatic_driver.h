@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/features/crease_energy.h"
@@ -58,7 +59,8 @@ class AutomaticDriver {
     taken_best_ = result_.chosen;
   }
 
-  void begin_attempt() { share_at_end_ += kAttemptPortion * (1 - share_at_end_); }
+  /// Begins an attempt that takes this portion of the work that is left.
+  void begin_attempt(double portion = kAttemptPortion) { share_at_end_ += portion * (1 - share_at_end_); }
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   /// Begins the part of an attempt that makes its template. Returns what to call with its share that is done.

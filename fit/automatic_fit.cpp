@@ -537,8 +537,10 @@ AutomaticFitResult AutomaticFit::run() {
   const std::vector<AutomaticAttempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !ends_search(); ++i) {
-    begin_attempt();
-    if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
+    if (is_worth_trying(attempts[i])) {
+      begin_attempt(attempts[i].portion);
+      going = run_attempt(attempts[i]);
+    }
     if (going && is_strict() && is_good() && meets_distances(best(), options_)) going = polish();
     if (going && result_.trials.empty() && diagnosis_ &&
         is_too_thin_for_grids(*diagnosis_, attempts.back().template_cells))

@@ -25,12 +25,10 @@ inline constexpr double kEnoughQuality = 0.85;
 /// the target are given up for it.
 inline constexpr double kAcceptableQuality = 0.3;
 
-/// Portions of the work, for forecasts. An attempt takes `kAttemptPortion` of what is left: in the middle of a fit, the
-/// share is then between a quarter and three quarters, whether the first attempt is the last or the second is. Of what
-/// is left of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit
-/// and of the first of several routings.
-inline constexpr double kAttemptPortion = 0.62, kTemplatePortion = 0.1, kCoarsePortion = 0.25, kSmoothPortion = 0.35,
-                        kRoutingPortion = 0.9;
+/// Portions of the work, for forecasts. An attempt takes `AutomaticAttempt::portion` of what is left. Of what is left
+/// of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit and of
+/// the first of several routings.
+inline constexpr double kTemplatePortion = 0.1, kCoarsePortion = 0.25, kSmoothPortion = 0.35, kRoutingPortion = 0.9;
 
 /// Returns the options, with the least goal that the stages can use in place of none. InputError: one out of range.
 AutomaticFitOptions checked_options(AutomaticFitOptions options);
