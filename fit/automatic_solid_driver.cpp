@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/automatic_solid_driver.h"
+
+#include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
+#include "subvol/fit/features/signed_features.h"
+#include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/level_samples.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <utility>
+
+namespace subvol::internal {
+
+namespace {
+
+constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
+
+}  // namespace
+
+void AutomaticSolidDriver::find_edges() {
+  if (!follows_.any()) return;
+  edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
+  constexpr double kNone = 180;  // no edge is sharper
+  std::vector<std::array<Index, 2>> borders;
+  if (options_.keeps_groups) borders = group_borders(edges_.mesh, original_);
+  const double angle = follows_.sharp ? *options_.crease_angle_degrees : kNone;
+  edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, angle, borders));
+  facets_ = flat_facets(target_.mesh);
+}
+
+void AutomaticSolidDriver::find_features() {
+  target_.sample(0);
+  const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
+  features_ =
+      feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2), most);
+}
+
+std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOptions options) {
+  options.progress = begin_template();
+  AutoTemplateResult made = auto_templates(original_, options, 1);
+  result_.topology = made.wanted;
+  if (!made.cancelled && made.templates.empty() && !diagnosis_)
+    diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
+  if (made.cancelled || (diagnosis_ && diagnosis_->is_cancelled)) {
+    note_end_in_template();
+    return std::nullopt;
+  }
+  if (made.templates.empty()) {
+    no_template_ = "target: " + why_no_grid(*diagnosis_, options.cells, made.wanted) + "; give a --template";
+    return std::nullopt;
+  }
+  target_.normalization.take_in(made.templates.front().mesh);
+  return std::move(made.templates.front());
+}
+
+std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::size_t cells) {
+  constexpr int kTries = 3;
+  constexpr double kLess = 0.97;
+  double asked = kRoomForTemplates * static_cast<double>(cells);
+  std::optional<AutoTemplate> smallest;
+  for (int trial = 1;; ++trial) {
+    const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
+    std::optional<AutoTemplate> made = make_template({.cells = count, .pillow = true});
+    if (!made) {
+      if (no_template_.empty() || !smallest) return std::nullopt;
+      no_template_.clear();
+      return smallest;
+    }
+    const std::size_t got = made->mesh.num_cells();
+    if (!smallest || got < smallest->mesh.num_cells()) smallest = std::move(made);
+    if (got <= cells || count == kLeastTemplateCells || trial == kTries) return smallest;
+    asked *= kLess * static_cast<double>(cells) / static_cast<double>(got);
+  }
+}
+
+void AutomaticSolidDriver::begin_cage() {
+  if (layout_) layout_->creases.keep_from_folding(mesh_);
+  AutomaticDriver::begin_cage();
+  if (!layout_) return;
+  level_layout_ = {cage_->groups_of_parts(layout_->group_of_face), cage_->caps_of_parts(layout_->caps),
+                   layout_->creases};
+  level_layout_.creases.refine(cage_->level().parent_creases);
+}
+
+bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
+  begin_part(portion, schedule.expected_steps());
+  const MeshTopology topology(mesh_);
+  const std::vector<double> sizes = cage_ ? cage_->of_children(sizes_) : sizes_;
+  std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
+  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid.mesh, mesh_, QualityWeights{}.least_edge, lengths);
+  const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of(mesh_);
+  sample_target(topology.boundary_faces().size());
+  QualityBoundary boundary{
+      .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.faces};
+  std::function<CreaseEnergy(double)> creases;
+  if (layout_) {
+    boundary.group_of_face = level_layout_.group_of_face;
+    boundary.group_of_triangle = layout_->group_of_triangle;
+    if (!mesh_.tags.creases.empty())
+      creases = [&](double width) {
+        CreaseEnergy energy = level_layout_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
+                                                           kQualityTangentialWeight);
+        const VolumeMesh& of_unknowns = cage_ ? cage_->cage : mesh_;
+        if (!sizes_.empty())
+          energy.weigh(crease_factors(of_unknowns, MeshTopology(of_unknowns), sizes_, samples.positions));
+        return energy;
+      };
+  }
+  const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
+    const std::span<const EdgeCap> edges =
+        layout_ ? std::span<const EdgeCap>(level_layout_.caps.edges) : std::span<const EdgeCap>();
+    const double least_edge = cage_ ? 0 : least_edge_share(start_.grid.mesh, lengths);
+    stages.energy().forbid_folds(edges, least_edge);
+    QualityCaps caps = layout_ ? level_layout_.caps : QualityCaps();
+    add_caps_between_sizes(mesh_, sizes, caps);
+    stages.energy().set_caps(caps.edges, caps.vertices);
+  });
+  start_.far = state_.far_cells;
+  start_.poor = state_.cells.poor;
+  return going;
+}
+
+std::optional<FeatureMiss> AutomaticSolidDriver::feature_miss(const TriangleMesh& surface) const {
+  std::optional<FeatureMiss> miss = largest_feature_miss(features_, ClosestPoint(surface));
+  if (!miss) return miss;
+  miss->place = target_.normalization.from_unit({miss->place})[0];
+  miss->size_percent = 100 * miss->size;
+  miss->distance *= target_.normalization.diagonal;
+  miss->size *= target_.normalization.diagonal;
+  return miss;
+}
+
+std::optional<CreaseDistance> AutomaticSolidDriver::distance_of_edges() const {
+  if (edges_.features.curves.empty()) return std::nullopt;
+  if (cage_ && layout_)
+    return level_layout_.creases.distance(cage_->limit().crease_edges, cage_->limit_surface().positions, 1,
+                                          &edges_.features.curves);
+  if (!layout_) return crease_distance(edges_.features.curves, mesh_.positions, {}, 1);
+  return crease_distance(edges_.features.curves, mesh_.positions, layout_->segments, 1, &layout_->creases.curves());
+}
+
+std::vector<UnfollowedCurve> AutomaticSolidDriver::unfollowed_curves() const {
+  if (layout_) return layout_->routing.unfollowed;
+  std::vector<UnfollowedCurve> all;
+  const std::vector<FeatureCurve>& curves = edges_.features.curves.curves;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const ArcLength arc(curves[c].points);
+    all.push_back(
+        {static_cast<Index>(c), NotFollowed::excluded, arc.at(arc.length() / 2), curves[c].points, arc.length()});
+  }
+  return all;
+}
+
+bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
+  if (options_.makes_cage && !cage_) begin_cage();  // the fit ended before it came to that
+  // Flattening a relaxed place could make its faces meet again. The rest of that mesh is flat from the trial before.
+  if (follows_.any() && !trial.relaxed_at) {
+    flatten_faces(cage_ ? cage_->cage : mesh_, target_.mesh, *target_.tree, facets_);
+    follow_cage();
+  }
+  const QualityReport quality = measure_quality(mesh_);
+  // The stages ask for less between cells of two sizes; a trial without such cells is better.
+  for (const Index c : cells_between_sizes(sizes_))
+    state_.cells.least_share = std::min(state_.cells.least_share, quality.cell_minima[c] / options_.quality);
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
+  trial.mean_percent = trial.max_percent = 0;  // the trial may have those of another state
+  const auto measure = [&](const TriangleMesh& fitted) {
+    const SurfaceDistance distance = target_.distance(fitted);
+    trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
+    trial.max_percent = std::max(trial.max_percent, 100 * distance.max());
+  };
+  measure(surface);
+  if (cage_) measure(cage_->limit_surface());
+  trial.feature_miss = feature_miss(surface);
+  trial.solid_volume_percent = volume_difference_percent(surface, target_.surface);
+  trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
+  const bool going = trial.self_intersections.has_value();
+  const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
+  if (!keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed)) return going;
+  start_.lost.clear();
+  for (const UnfollowedCurve& curve : unfollowed)
+    if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.points);
+  best_start_ = start_;
+  return going;
+}
+
+std::vector<double> AutomaticSolidDriver::faults_of_cells() const {
+  constexpr double kMeets = 1;
+  std::vector<double> faults;
+  for (const double least : measure_quality(mesh_).cell_minima)
+    faults.push_back(std::max(0.0, kAcceptableQuality - least));
+  for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
+  return cage_ ? cage_->sums_of_parts(faults) : faults;
+}
+
+bool AutomaticSolidDriver::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind) {
+  layout_.reset();
+  cage_.reset();
+  mesh_ = grid.mesh;
+  sizes_ = grid.sizes;
+  start_ = {.kind = kind, .grid = std::move(grid)};
+  if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) return false;
+  start_.fitted = mesh_.positions;
+  lay_out({});
+  return true;
+}
+
+void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
+  routing.cancelled = [this] { return runner_.is_to_end(); };
+  routing.sizes = vertex_sizes(start_.grid.mesh, start_.grid.sizes);
+  layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
+  cage_.reset();
+  mesh_ = layout_->tagged_mesh;
+  level_layout_ = {layout_->group_of_face, layout_->caps, layout_->creases};
+  sizes_ = padded_sizes(mesh_, start_.grid.sizes);
+}
+
+std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
+  std::vector<Fault> faults;
+  if (best().self_intersections != std::size_t{0})
+    for (const Index c : cells_that_meet(result_.mesh)) faults.push_back({c});
+  const std::vector<double> least = measure_quality(result_.mesh).cell_minima;
+  std::vector<Index> poor = best_start_.poor;
+  std::ranges::stable_sort(poor, std::less{}, [&](Index c) { return least[c]; });
+  for (const Index c : poor)
+    if (least[c] < kEnoughQuality * options_.quality) faults.push_back({c});
+  for (const Index c : best_start_.far) faults.push_back({c});
+  if (best_start_.kind == AutomaticAttempt::Kind::smooth) return faults;
+  const VolumeMesh& grid = best_start_.grid.mesh;
+  for (Fault& fault : faults) fault = cells_at(grid, best_start_.fitted, result_.mesh, fault);
+  const BoundaryCells cells(grid, best_start_.fitted);
+  std::vector<std::vector<Vec3>> lost = best_start_.lost;
+  std::ranges::stable_sort(lost, std::greater{}, [](const std::vector<Vec3>& curve) { return polyline_length(curve); });
+  const double spacing = std::sqrt(target_.surface.area() / static_cast<double>(grid.num_cells()));
+  for (const std::vector<Vec3>& curve : lost) faults.push_back(cells.near(sampled_polyline(curve, spacing)));
+  const TriangleMesh surface = refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh)));
+  faults.push_back(cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
+  return faults;
+}
+
+}  // namespace subvol::internal
