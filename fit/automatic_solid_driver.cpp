@@ -8,6 +8,7 @@
 #include "subvol/fit/fits/level_samples.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/mesh/mesh_topology.h"
