@@ -48,22 +48,22 @@ std::filesystem::path page_path(const ViewArguments& arguments) {
   return path;
 }
 
-/// The meshes to show, and a report about them.
+/// The meshes to show, and a report about them. The content is made without the viewer, too, so that the same inputs
+/// are refused.
 struct Subject {
   Json report;
   ReportMeshes meshes;
   std::optional<ViewerContent> content;
 };
 
-/// Makes the content of the page, unless there is no viewer.
 Subject subject_of_report(const ViewArguments& arguments, const WorkProgress& progress,
                           std::vector<std::string>& warnings) {
   if (!arguments.target.empty() || arguments.viewing.limit)
     throw UsageError("--target and --limit are for meshes; a report names its target and its cage");
   Subject subject{parse_report(read_file(arguments.input), arguments.input), {}, {}};
   subject.meshes = load_report_meshes(subject.report, std::filesystem::path(arguments.input).parent_path(), warnings);
-  if (has_viewer()) subject.content = report_content(subject.report, subject.meshes, warnings, progress);
-  if (subject.content || !has_viewer()) return subject;
+  subject.content = report_content(subject.report, subject.meshes, warnings, progress);
+  if (subject.content) return subject;
   std::string reasons;
   for (const std::string& warning : warnings) reasons += "; " + warning;
   throw InputError(arguments.input + ": none of the meshes that the report names can be shown" + reasons);
@@ -84,9 +84,7 @@ Subject subject_of_mesh(const ViewArguments& arguments, const WorkProgress& prog
     subject.meshes.target = as_polygons(target);
   }
   const std::filesystem::path path = arguments.input;
-  if (has_viewer())
-    subject.content =
-        mesh_content(path.filename().string(), *subject.meshes.result, options, warnings, path, progress);
+  subject.content = mesh_content(path.filename().string(), *subject.meshes.result, options, warnings, path, progress);
   return subject;
 }
 
@@ -110,7 +108,7 @@ int run_view(const ViewArguments& arguments) {
     const Subject subject = is_report(arguments.input) ? subject_of_report(arguments, teller.work(), warnings)
                                                        : subject_of_mesh(arguments, teller.work(), warnings);
     teller.finish();
-    write_file_atomically(page, subject.content ? viewer_page(*subject.content) : picture_page(subject, warnings));
+    write_file_atomically(page, has_viewer() ? viewer_page(*subject.content) : picture_page(subject, warnings));
   } catch (const Json::exception& error) {
     throw InputError(arguments.input + ": expected the entries of a report as subvol writes it: " + error.what());
   }

@@ -3,10 +3,10 @@
 
 #include <Eigen/QR>
 
-namespace subvol {
+namespace subvol::internal {
 
 Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
   return matrix.completeOrthogonalDecomposition().solve(right);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Solves a small linear system in the least-squares sense: of all x with the least |A x - b|, the one of least norm.
 ///
@@ -13,4 +13,4 @@ namespace subvol {
 /// Cost: cubic. Eigen's decomposition is compiled here only, because that takes long.
 Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 
-}  // namespace subvol
+}  // namespace subvol::internal
