@@ -3,6 +3,7 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/report.h"
+#include "cli/verbs/verb_options.h"
 #include "subvol/base/process_memory.h"
 
 #include <algorithm>
@@ -16,6 +17,7 @@ void LongRun::prepare(const std::vector<Part>& parts) {
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
+  add_warnings(unused_scene_options(verb_, outputs_));
 }
 
 bool LongRun::precedes_result(std::string_view stage) {

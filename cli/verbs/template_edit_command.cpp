@@ -231,7 +231,7 @@ void add_grid(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
   CLI::App* verb = add_edit(group, action, a, "grid", "Fill a box with equal hexes", make_grid);
   verb->add_option("SURFACE", a->mesh, "Take the box around this surface")->type_name("FILE");
-  add_box(*verb, *a, "Or take this box");
+  CLI::Option* box = add_box(*verb, *a, "Or take this box");
   verb->add_option("--counts", a->counts, "Cells along each axis")
       ->expected(3)
       ->check(whole_number_in(1, 100'000))
@@ -240,7 +240,10 @@ void add_grid(CLI::App& group, Action& action) {
       ->check(number_in(1e-300, 1e300))
       ->type_name("LENGTH");
   verb->add_option("--margin", a->margin, "How far the box stands off the surface, in per cent of its diagonal")
-      ->check(number_in(0.0, 1000.0))->type_name("PERCENT")->capture_default_str();
+      ->check(number_in(0.0, 1000.0))
+      ->type_name("PERCENT")
+      ->capture_default_str()
+      ->excludes(box);
 }
 
 /// Adds --inside with --share, --box and --list.

@@ -207,6 +207,19 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->group(group);
 }
 
+std::vector<std::string> unused_scene_options(const CLI::App& verb, std::span<const Output> outputs) {
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& name, const char* missing) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    if (option && option->count() > 0) warnings.push_back(name + " has no effect: no output is " + missing);
+  };
+  if (std::ranges::none_of(outputs, &Output::is_scene))
+    for (const char* name : {"--no-wireframe", "--quantize"}) warn(name, "a scene (.glb, .gltf)");
+  if (std::ranges::none_of(outputs, [](const Output& output) { return output.part == Part::cutaway; }))
+    warn("--cut", "a cutaway (cutaway:FILE)");
+  return warnings;
+}
+
 CLI::Validator number_in(double low, double high) {
   std::ostringstream range;
   range << low << " .. " << high;

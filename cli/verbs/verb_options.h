@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/checkpointing.h"
+#include "cli/runs/outputs.h"
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
 #include "subvol/base/types.h"
@@ -12,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +39,9 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options);
 void add_msh_version_option(CLI::App& verb, WritingOptions& options);
 /// --msh-version, --vtu-cells, --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
+
+/// Returns a warning for each option of scenes that was given although no output is one.
+std::vector<std::string> unused_scene_options(const CLI::App& verb, std::span<const Output> outputs);
 
 /// --regions. Its value is empty unless it is given, so that it is not among the options that files record.
 void add_regions_option(CLI::App& verb, std::string& rule);

@@ -78,6 +78,18 @@ TEST_CASE("Scenes are smaller without wireframe and in whole numbers", "[cli]") 
   check_with_validator({place / "small.glb"});
 }
 
+TEST_CASE("Options of scenes are warned of if no output is one", "[cli]") {
+  const Workplace place;
+  const Run unused = place.run("convert template.mesh -o a.vtu --quantize --no-wireframe --cut x");
+  CHECK(unused.status == 0);
+  for (const char* words : {"--quantize has no effect: no output is a scene", "--no-wireframe has no effect",
+                            "--cut has no effect: no output is a cutaway"})
+    CHECK(unused.err.find(words) != std::string::npos);
+  const Run used = place.run("convert template.mesh -o cutaway:b.glb --quantize --cut x");
+  CHECK(used.status == 0);
+  CHECK(used.err.find("no effect") == std::string::npos);
+}
+
 TEST_CASE("Parts that there are not are refused before any work", "[cli]") {
   const Workplace place;
   for (const char* words : {"convert template.mesh -o animation:a.glb", "convert template.mesh -o cage:a.mesh",
