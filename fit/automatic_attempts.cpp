@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace subvol::internal {
 
@@ -58,6 +59,28 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
     }
   }
   return attempts;
+}
+
+double expected_portion(std::span<const AutomaticAttempt> attempts, const AutomaticFitTrial* best,
+                        const AutomaticFitOptions& options) {
+  constexpr double kAll = 0.95;  // of the work of all attempts; what follows them takes the rest
+  const auto cells_of = [](const AutomaticAttempt& attempt) {
+    return static_cast<double>(cells_after(attempt.template_cells, attempt.levels));
+  };
+  const double first = cells_of(attempts.front());
+  double needed = 1.5 * first;
+  if (best) {
+    const double excess = std::max(
+        {best->mean_percent / options.mean_tolerance_percent, best->max_percent / options.max_tolerance_percent, 1.0});
+    needed = static_cast<double>(best->cells) * std::pow(excess, 1.5);
+  }
+  double work = 0;
+  for (const AutomaticAttempt& attempt : attempts) {
+    work += cells_of(attempt);
+    if (cells_of(attempt) >= needed) break;
+  }
+  if (!best && std::ranges::none_of(attempts, [&](const auto& a) { return cells_of(a) >= needed; })) work = first;
+  return kAll * first / work;
 }
 
 }  // namespace subvol::internal

@@ -4,12 +4,15 @@
 #include "subvol/fit/automatic_fit.h"
 
 #include <cstddef>
+#include <optional>
+#include <span>
 #include <vector>
 
 namespace subvol::internal {
 
-/// Portion of the work that is left, for forecasts: in the middle of a fit, the share that is done is then between a
-/// quarter and three quarters, whether the first attempt is the last or the second is.
+/// Portion of the work that is left, for forecasts, if nothing is known about the attempts that follow: in the middle
+/// of a fit, the share that is done is then between a quarter and three quarters, whether the first attempt is the last
+/// or the second is.
 inline constexpr double kAttemptPortion = 0.62;
 
 /// One attempt of an automatic fit of one solid: a template of at most so many cells, and the number of times it is
@@ -24,7 +27,7 @@ struct AutomaticAttempt {
   std::size_t template_cells;
   int levels;
   bool is_last_count = true;        ///< no attempt with more cells follows
-  double portion = kAttemptPortion;  ///< of the work that is left
+  std::optional<double> portion{};  ///< of the work that is left, for forecasts; nothing: `expected_portion`
   bool precedes_unrefined = false;  ///< an attempt follows whose template has as many cells as this result
 };
 
@@ -34,5 +37,14 @@ std::size_t cells_after(std::size_t cells, int levels);
 /// Returns the attempts to make, in this order, until a fit is good.
 /// has_edges  the target has sharp edges to follow.
 std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges);
+
+/// Returns the portion of the work that is left that the first of some attempts is expected to take, if work grows with
+/// the number of cells.
+///
+/// attempts  those that are left, at least one.
+/// best      the best trial so far: distances fall with the square of the cells' size, so it tells which attempt will
+///           be the last. Null: the first attempt with more cells than the first of all.
+double expected_portion(std::span<const AutomaticAttempt> attempts, const AutomaticFitTrial* best,
+                        const AutomaticFitOptions& options);
 
 }  // namespace subvol::internal

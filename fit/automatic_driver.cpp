@@ -204,7 +204,8 @@ bool AutomaticDriver::relax_last_trial() {
   relaxed_at_.reset();
   is_relaxing_ = true;
   // Without stages and lift, the level is only judged by the quality and the distance aimed at.
-  const bool going = fit_level(trial.level, aiming_at_distance({{}, {}, options_.quality}), ", relaxed");
+  const bool going =
+      fit_level(trial.level, aiming_at_distance({{}, {}, options_.quality}), ", relaxed", kRoutingPortion);
   is_relaxing_ = false;
   trial.relaxed_at = relaxed_at_;
   return judge(std::move(trial)) && going;

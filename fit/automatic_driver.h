@@ -60,7 +60,10 @@ class AutomaticDriver {
   }
 
   /// Begins an attempt that takes this portion of the work that is left.
-  void begin_attempt(double portion = kAttemptPortion) { share_at_end_ += portion * (1 - share_at_end_); }
+  void begin_attempt(double portion = kAttemptPortion) {
+    const double done = runner_.work().share_at_end();
+    share_at_end_ = done + portion * (1 - done);
+  }
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   /// Begins the part of an attempt that makes its template. Returns what to call with its share that is done.

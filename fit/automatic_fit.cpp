@@ -25,6 +25,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -263,7 +264,8 @@ AutomaticFitResult AutomaticFit::run() {
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !ends_search(); ++i) {
     if (is_worth_trying(attempts[i])) {
-      begin_attempt(attempts[i].portion);
+      begin_attempt(attempts[i].portion.value_or(
+          expected_portion(std::span(attempts).subspan(i), result_.trials.empty() ? nullptr : &best(), options_)));
       going = run_attempt(attempts[i]);
     }
     if (going && is_strict() && is_good() && meets_distances(best(), options_)) going = polish();

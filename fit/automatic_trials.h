@@ -26,8 +26,8 @@ inline constexpr double kEnoughQuality = 0.85;
 inline constexpr double kAcceptableQuality = 0.3;
 
 /// Portions of the work, for forecasts. An attempt takes `AutomaticAttempt::portion` of what is left. Of what is left
-/// of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit and of
-/// the first of several routings.
+/// of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit, and of
+/// each routing and relaxation.
 inline constexpr double kTemplatePortion = 0.1, kCoarsePortion = 0.25, kSmoothPortion = 0.35, kRoutingPortion = 0.9;
 
 /// Returns the options, with the least goal that the stages can use in place of none. InputError: one out of range.

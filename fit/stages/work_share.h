@@ -14,11 +14,11 @@ class WorkShare {
   /// A work of which this share is done.
   explicit WorkShare(double done) : begin_(done), end_(done) {}
 
-  /// Begins a part, at whose end the share will be `end`; if that much is done already, a third of what is left. The
+  /// Begins a part, at whose end the share will be `end`; if that much is done already, a tenth of what is left. The
   /// part before is over, whatever its forecast was.
   /// forecast  work that the part is expected to take, > 0, in any unit.
   void begin_part(double end, double forecast) {
-    constexpr double kLeastPart = 1.0 / 3;
+    constexpr double kLeastPart = 0.1;
     begin_ = end_;
     end_ = end > begin_ ? std::min(end, 1.0) : begin_ + kLeastPart * (1 - begin_);
     forecast_ = forecast;
@@ -33,6 +33,8 @@ class WorkShare {
   /// Sets the share of the part that is done, >= 0, in place of counted work.
   void set(double share_of_part) { done_ = std::max(done_, share_of_part * forecast_); }
 
+  /// Returns the share at the end of the present part.
+  double share_at_end() const { return end_; }
   double share() const {
     constexpr double kTrusted = 0.8;  // from here on, the part's end is approached and never reached
     const double done = done_ / forecast_, rest = 1 - kTrusted;

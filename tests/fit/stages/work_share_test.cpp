@@ -21,6 +21,7 @@ TEST_CASE("The share of a work follows its forecast and never falls or ends", "[
   }
   work.begin_part(0.4, 1);  // ends before what is done
   CHECK(work.share() == 0.5);
+  CHECK(work.share_at_end() == Approx(0.55));  // a tenth of what is left
   before = work.share();
   work.add(0.5);
   CHECK(work.share() > before);
