@@ -11,6 +11,8 @@
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/part_nesting.h"
+#include "subvol/surface/surface_parts.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -113,6 +115,20 @@ bool begins(const char* part, double fraction, const WorkProgress& progress, Mes
   return !check.ended_early;
 }
 
+/// Returns a vertex of each part of a surface whose normals point into the solid that all parts bound together.
+std::vector<Vec3> parts_facing_inward(const TriangleMesh& surface) {
+  const SurfaceParts parts = surface_parts(surface);
+  if (std::ranges::find(parts.is_closed, 0) != parts.is_closed.end()) return {};
+  const PartNesting nesting = part_nesting(surface, parts.part, static_cast<int>(parts.num_parts()));
+  std::vector<Vec3> places;
+  for (std::size_t p = 0; p < parts.num_parts(); ++p) {
+    if (nesting.faces_out(p)) continue;
+    const auto first = std::ranges::find(parts.part, static_cast<int>(p)) - parts.part.begin();
+    places.push_back(surface.positions[surface.triangles[static_cast<std::size_t>(first)][0]]);
+  }
+  return places;
+}
+
 void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const Compare& compare,
                     const WorkProgress& progress, MeshCheck& check) {
   if (!begins("self-intersections", 0.3, progress, check)) return;
@@ -127,6 +143,7 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  if (check.num_boundary_components > 1 && faces.empty()) check.parts_inside_solids = parts_facing_inward(triangles);
   const bool to_compare = compare && !triangles.triangles.empty();
   if (to_compare && begins("distance", 0.6, progress, check)) compare(triangles, check);
 }
@@ -334,7 +351,7 @@ bool MeshCheck::valid() const {
   const bool sound = std::all_of(defects.begin(), defects.end(),
                                  [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
   const bool certified = quality && quality->certificate.all_certified();
-  return sound && certified && has_boundary_geometry && intersecting_faces.empty();
+  return sound && certified && has_boundary_geometry && intersecting_faces.empty() && parts_inside_solids.empty();
 }
 
 OrderSummary order_summary(const ElementSpace& space) {
@@ -411,6 +428,9 @@ std::string to_text(const MeshCheck& check) {
     append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)%s\n",
            check.intersecting_faces.size(), check.num_intersecting_triangle_pairs,
            all ? "" : ", where the search ended");
+    for (const Vec3& place : check.parts_inside_solids)
+      append(text, "solid in a solid    the part of the boundary at (%.6g, %.6g, %.6g)\n", place[0], place[1],
+             place[2]);
     if (check.num_degenerate_boundary_triangles > 0)
       append(text, "without area        %zu boundary triangles\n", check.num_degenerate_boundary_triangles);
   }

@@ -87,14 +87,17 @@ struct MeshCheck {
   std::vector<std::array<Index, 2>> intersecting_faces;
   std::size_t num_intersecting_triangle_pairs = 0;           ///< if `kMostIntersectingPairs`: at least that many
   std::size_t num_degenerate_boundary_triangles = 0;         ///< of zero area: not checked for intersections
+  /// A vertex of each closed part of the boundary that faces the wrong way: it bounds a solid inside another solid,
+  /// which no intersection shows. Only looked for if the boundary has several components and does not meet itself.
+  std::vector<Vec3> parts_inside_solids;
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary
   std::optional<NormalDeviation> normals;  ///< between the boundary and a target of triangles
   double target_diagonal = 0;                                ///< diagonal of the target's bounding box: 100 per cent
 
   /// Returns true if the mesh can be used as it is: it has no defects except unused vertices, every cell is certified,
-  /// and the boundary's triangles (those with an area) do not intersect. Returns false if one of these was not checked.
-  /// The distance does not matter.
+  /// the boundary's triangles (those with an area) do not intersect, and no solid lies in another. Returns false if one
+  /// of these was not checked. The distance does not matter.
   bool valid() const;
   double mean_distance_percent() const { return in_percent(distance ? distance->mean() : 0); }
   double max_distance_percent() const { return in_percent(distance ? distance->max() : 0); }

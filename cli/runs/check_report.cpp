@@ -128,6 +128,10 @@ Json check_json(const MeshCheck& check) {
     json["boundary_self_intersections"] = check.num_intersecting_triangle_pairs;
     json["intersecting_boundary_faces"] = check.intersecting_faces;
     json["degenerate_boundary_triangles"] = check.num_degenerate_boundary_triangles;
+    if (!check.parts_inside_solids.empty()) {
+      Json& parts = json["parts_inside_solids"] = Json::array();
+      for (const Vec3& place : check.parts_inside_solids) parts.push_back(point_json(place));
+    }
     json["volume"] = check.volume;
     if (check.orders) json["boundary_chord_error"] = check.chord_error;
   }

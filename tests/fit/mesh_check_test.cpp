@@ -116,6 +116,32 @@ TEST_CASE("an inverted cell and a boundary that runs through itself are not vali
   CHECK(to_text(crossing).ends_with("\nNOT VALID\n"));
 }
 
+TEST_CASE("a solid inside another one is not valid, one in its cavity is", "[mesh_check]") {
+  const auto blocks = [](const VolumeMesh& outer, double size) {
+    VolumeMesh mesh = outer;
+    const auto first = static_cast<Index>(mesh.num_vertices());
+    const VolumeMesh inner = lattice(1, 1, 1);
+    for (const Vec3& p : inner.positions) mesh.positions.push_back(Vec3(1.5, 1.5, 1.5) + size * (p - Vec3(.5, .5, .5)));
+    std::vector<Index> corners;
+    for (const Index v : inner.cell(0)) corners.push_back(first + v);
+    mesh.add_cell(inner.kinds[0], corners);
+    return mesh;
+  };
+  const VolumeMesh solid = lattice(3, 3, 3);
+  VolumeMesh hollow;
+  hollow.positions = solid.positions;
+  for (std::size_t c = 0; c < solid.num_cells(); ++c)
+    if (c != 13) hollow.add_cell(solid.kinds[c], solid.cell(c));
+  const MeshCheck inside = check_mesh(blocks(solid, 0.5), nullptr, {});
+  CHECK(inside.intersecting_faces.empty());
+  REQUIRE(inside.parts_inside_solids.size() == 1);
+  CHECK((inside.parts_inside_solids[0] - Vec3(1.5, 1.5, 1.5)).norm() < 0.5);
+  CHECK_FALSE(inside.valid());
+  CHECK(to_text(inside).find("solid in a solid") != std::string::npos);
+  CHECK(check_mesh(blocks(hollow, 0.5), nullptr, {}).valid());
+  CHECK(check_mesh(hollow, nullptr, {}).valid());
+}
+
 TEST_CASE("distances to a target are told in length and in per cent of the target's diagonal", "[mesh_check]") {
   const VolumeMesh mesh = lattice(1, 1, 1);
   TriangleMesh target = boundary_triangles(mesh);
