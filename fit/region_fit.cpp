@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/boundary_samples.h"
@@ -362,9 +363,12 @@ AutomaticFitResult RegionFit::run() {
   std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
   if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
   if (options_.cells) counts = {*options_.cells};
+  std::vector<AutomaticAttempt> attempts;
+  for (const std::size_t count : counts) attempts.push_back({AutomaticAttempt::Kind::smooth, count, 0});
   bool going = true;
   for (std::size_t i = 0; i < counts.size() && going && !is_good(); ++i) {
-    begin_attempt();
+    begin_attempt(
+        expected_portion(std::span(attempts).subspan(i), result_.trials.empty() ? nullptr : &best(), options_));
     going = run_count(counts[i]);
   }
   if (going && !is_good() && !follows_edges_ && !options_.cells) {
