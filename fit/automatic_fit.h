@@ -147,9 +147,11 @@ struct AutomaticFitResult {
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
+///         + min(3, max(0, difference of the volume / 5 % - 1))
 ///         + 5 (1 - least share of the quality that a cell reaches) + 5 max(0, 1 - least scaled Jacobian / 0.3)
 ///         + 3 (1 - share of the edges within 0.1 %)
-///         + 1.5 if edges longer than 10 % are not followed, but for acute ones, or if a feature is lost
+///         + 1.5 if edges longer than 10 % are not followed, but for acute ones, if a feature is lost, or if the volume
+///           differs by more than 5 %
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.

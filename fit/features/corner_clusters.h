@@ -24,7 +24,7 @@ inline constexpr double kLeastRoutedLength = 0.5;
 /// followed   one entry per curve, not zero for curves that paths are to follow.
 /// vanishing  likewise for curves that are too short for a path.
 /// returns    for each corner that belongs to a cluster, the smallest number of a corner there. Cost: one sort of the
-///            curves that vanish.
+///            curves that vanish, and the square of the number of corners of each cluster.
 std::map<Index, Index> corner_clusters(const RoutingGraph& graph, const SignedFeatures& features,
                                        std::span<const std::uint8_t> followed, std::span<const std::uint8_t> vanishing);
 

@@ -86,6 +86,7 @@ Index CornerPlacement::vertex_of(Index corner) const {
 }
 
 Index CornerPlacement::corner_at(Index vertex) const {
+  if (!taken_[vertex]) return kNoIndex;
   const auto at = std::ranges::find_if(vertex_of_corner_, [&](const auto& placed) { return placed.second == vertex; });
   return at == vertex_of_corner_.end() ? kNoIndex : at->first;
 }

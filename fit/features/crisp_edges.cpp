@@ -2,13 +2,15 @@
 #include "subvol/fit/features/crisp_edges.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/surface/triangle_geometry.h"
+#include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <map>
-#include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -16,53 +18,72 @@ namespace subvol::internal {
 
 namespace {
 
-using Edge = std::pair<Index, Index>;
-
 /// The angles between the triangles of a surface.
 class Bends {
  public:
-  Bends(const TriangleMesh& mesh, const FeatureCurves& curves) : mesh_(mesh) {
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      const auto& [a, b, c] = mesh.triangles[t];
-      const Vec3 area = (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
+  Bends(const TriangleMesh& mesh, const FeatureCurves& curves) {
+    std::vector<std::array<Index, 3>> triangles;
+    std::vector<Vec3> normals;
+    for (const auto& triangle : mesh.triangles) {
+      const auto& [a, b, c] = triangle;
+      if (a == b || b == c || c == a) continue;
+      const Vec3 area = doubled_area_vector(mesh, triangle);
       area_ += area.norm() / 2;
-      normals_.push_back(area.normalized());
-      for (int k = 0; k < 3; ++k) triangles_of_[edge_of(t, k)].push_back(static_cast<Index>(t));
+      normals.push_back(area.normalized());
+      triangles.push_back(triangle);
     }
+    sides_ = sorted_half_edges(triangles, mesh.positions.size());
+    edges_of_.resize(triangles.size());
+    std::vector<int> num_edges(triangles.size(), 0);
+    for_each_edge(sides_, [&](std::span<const SurfaceHalfEdge> sides) {
+      for (const SurfaceHalfEdge& side : sides)
+        edges_of_[side.triangle][num_edges[side.triangle]++] = static_cast<Index>(edges_.size());
+      edges_.push_back({sides, sides.size() == 2 ? angle_between(sides[0], sides[1], normals) : 0, false});
+    });
     for (const FeatureCurve& curve : curves.curves)
       for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
-        on_curves_.insert(std::minmax(curve.vertices[i], curve.vertices[i + 1]));
+        if (const Index e = find(curve.vertices[i], curve.vertices[i + 1]); e != kNoIndex) edges_[e].on_curve = true;
   }
 
   double area() const { return area_; }
 
-  /// Angle between the two triangles of an edge, whatever their orientation; 0 if there are not two.
-  double angle(const Edge& edge) const {
-    const auto at = triangles_of_.find(edge);
-    if (at == triangles_of_.end() || at->second.size() != 2) return 0;
-    return std::acos(std::clamp(std::abs(normals_[at->second[0]].dot(normals_[at->second[1]])), 0.0, 1.0));
-  }
-
-  bool is_crisp(const Edge& edge) const {
+  bool is_crisp(Index v, Index w) const {
     constexpr double kMostShare = 1.0 / 3;
-    const auto at = triangles_of_.find(edge);
-    if (at == triangles_of_.end()) return false;
+    const Index edge = find(v, w);
+    if (edge == kNoIndex) return false;
     double others = 0;
-    for (const Index t : at->second)
-      for (int k = 0; k < 3; ++k)
-        if (!on_curves_.contains(edge_of(t, k))) others = std::max(others, angle(edge_of(t, k)));
-    return others < kMostShare * angle(edge);
+    for (const SurfaceHalfEdge& side : edges_[edge].sides)
+      for (const Index e : edges_of_[side.triangle])
+        if (!edges_[e].on_curve) others = std::max(others, edges_[e].angle);
+    return others < kMostShare * edges_[edge].angle;
   }
 
  private:
-  Edge edge_of(std::size_t t, int k) const {
-    return std::minmax(mesh_.triangles[t][k], mesh_.triangles[t][(k + 1) % 3]);
+  struct Edge {
+    std::span<const SurfaceHalfEdge> sides;
+    double angle;  ///< between its two triangles, in degrees; 0 if there are not two
+    bool on_curve;
+  };
+
+  /// Returns the angle between two triangles, whatever their orientation.
+  static double angle_between(const SurfaceHalfEdge& a, const SurfaceHalfEdge& b, std::span<const Vec3> normals) {
+    const double sign = a.forward == b.forward ? -1 : 1;
+    return angle_degrees_between(normals[a.triangle], sign * normals[b.triangle]);
   }
 
-  const TriangleMesh& mesh_;
-  std::vector<Vec3> normals_;
-  std::map<Edge, std::vector<Index>> triangles_of_;
-  std::set<Edge> on_curves_;
+  /// Returns the number of an edge; kNoIndex if no triangle has it.
+  Index find(Index v, Index w) const {
+    const std::pair<Index, Index> ends = std::minmax(v, w);
+    const auto at = std::ranges::lower_bound(
+        edges_, ends, {}, [](const Edge& edge) { return std::pair(edge.sides.front().low, edge.sides.front().high); });
+    const bool found =
+        at != edges_.end() && at->sides.front().low == ends.first && at->sides.front().high == ends.second;
+    return found ? static_cast<Index>(at - edges_.begin()) : kNoIndex;
+  }
+
+  std::vector<SurfaceHalfEdge> sides_;
+  std::vector<Edge> edges_;                     ///< ascending by their ends
+  std::vector<std::array<Index, 3>> edges_of_;  ///< of each triangle that is no sliver with two equal corners
   double area_ = 0;
 };
 
@@ -88,7 +109,8 @@ class PartDiagonals {
 }  // namespace
 
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves) {
-  constexpr double kLong = 0.03, kMost = 0.5;
+  constexpr double kLong = 0.03;  // share of the diagonal
+  constexpr double kMost = 0.5;   // share of a curve's length that is crisp
   EdgeCrispness result;
   if (curves.empty()) return result;
   const Bends bends(mesh, curves);
@@ -97,7 +119,7 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   for (const FeatureCurve& curve : curves.curves) {
     double crisp_here = 0;
     for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
-      if (bends.is_crisp(std::minmax(curve.vertices[i], curve.vertices[i + 1])))
+      if (bends.is_crisp(curve.vertices[i], curve.vertices[i + 1]))
         crisp_here += (curve.points[i + 1] - curve.points[i]).norm();
     const double length = curve.length();
     all += length;

@@ -28,8 +28,8 @@ class CurveWalk {
   /// softness > 0.  reach  vertices farther from the polyline are not used.
   CurveWalk(std::vector<Vec3> points, std::array<double, 3> factors, double softness, double reach);
 
-  /// Returns the vertices of the cheapest path, or none. Only its ends, which differ, may be occupied. They may be away
-  /// from the ends of the polyline by twice the reach.
+  /// Returns the vertices of the cheapest path, or none. Only its ends, which differ, may be occupied. They correspond
+  /// to places of the polyline within twice the reach of its ends, however far away they are.
   /// others  more vertices that are occupied, ascending.
   /// A path along a polyline that comes close to itself may pass through a vertex twice; it counts as none.
   std::vector<Index> cheapest_path(const RoutingGraph& graph, Index from, Index to, const Occupied& occupied,

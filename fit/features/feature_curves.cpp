@@ -166,7 +166,12 @@ FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
   if (!(angle_degrees >= 0 && angle_degrees <= 180))
     throw InputError("feature_curves: angle_degrees must be in [0, 180], got " + std::to_string(angle_degrees));
   std::vector<std::array<Index, 2>> sharp = sharp_edges(mesh, angle_degrees);
-  for (const auto& [a, b] : tagged) sharp.push_back({std::min(a, b), std::max(a, b)});
+  for (const auto& [a, b] : tagged) {
+    if (std::min(a, b) < 0 || static_cast<std::size_t>(std::max(a, b)) >= mesh.positions.size() || a == b)
+      throw InputError("feature_curves: a tagged edge joins vertices " + std::to_string(a) + " and " +
+                       std::to_string(b) + " of " + std::to_string(mesh.positions.size()));
+    sharp.push_back({std::min(a, b), std::max(a, b)});
+  }
   std::sort(sharp.begin(), sharp.end());
   sharp.erase(std::unique(sharp.begin(), sharp.end()), sharp.end());
   return EdgeWalk(mesh, sharp, angle_degrees).curves();

@@ -55,8 +55,9 @@ std::vector<std::array<Index, 2>> group_borders(const TriangleMesh& mesh, const 
 ///
 /// mesh           connected by common vertices; triangles may be oriented inconsistently. Triangles without area make
 ///                no edge sharp.
-/// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError, as for a corner out of range.
-/// tagged         edges of the mesh that are sharp whatever their angle.
+/// angle_degrees  deviation from flat, in [0, 180].
+/// tagged         edges between different vertices of the mesh that are sharp whatever their angle.
+/// InputError: an angle out of range or NaN; a vertex number out of range; a tagged edge from a vertex to itself.
 /// Each sharp edge is in exactly one curve. Cost: linear except for one sort of the edges.
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                              std::span<const std::array<Index, 2>> tagged = {});

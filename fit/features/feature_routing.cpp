@@ -156,7 +156,7 @@ class Router {
     if (features_.angles.size() != curves_.size())
       throw InputError("route_features: features need one angle for each of the " + std::to_string(curves_.size()) +
                        " curves");
-    for (const auto* list : {&options.excluded, &options.not_joined})
+    for (const auto* list : {&options.excluded, &options.not_joined, &options.along_sheet_curves})
       if (!list->empty() && list->size() != curves_.size())
         throw InputError("route_features: options need one entry for each of the " + std::to_string(curves_.size()) +
                          " curves");

@@ -6,6 +6,7 @@
 #include "subvol/subdivision/audit.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <utility>
@@ -14,8 +15,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kMaxUnfoldings = 5;
-constexpr double kMost = 0.5;
+constexpr int kMaxUnfoldings = 5;  // rounds; each adds tags, and few need a second one
+constexpr double kMost = 0.5;      // share of the length of the target's sharp edges
 
 /// Adds tags that keep sheets from folding at corners. A crease added at one corner may leave a span of more than 180
 /// degrees at another.
@@ -24,6 +25,30 @@ void unfold(VolumeMesh& mesh) {
     const SubdivisionAudit found = audit(mesh);
     if (found.folding_edges.empty()) break;
     mesh.tags = unfolding_tags(mesh, found);
+  }
+}
+
+/// Adds the pieces of a curve along the edges that belong to a set: the curve itself if all of them do.
+template <class Contains>
+void add_pieces(const FeatureCurve& curve, const Contains& contains, std::vector<FeatureCurve>& pieces) {
+  const std::size_t edges = curve.vertices.size() - 1;
+  std::vector<std::uint8_t> belongs;
+  for (std::size_t i = 0; i < edges; ++i) belongs.push_back(contains(curve.vertices[i], curve.vertices[i + 1]));
+  const auto first_other = static_cast<std::size_t>(std::ranges::find(belongs, 0) - belongs.begin());
+  if (first_other == edges) {
+    pieces.push_back(curve);
+    return;
+  }
+  const std::size_t begin = curve.closed() ? first_other : 0;  // no piece runs across the ends of a closed curve
+  bool is_open = false;
+  for (std::size_t k = 0; k < edges; ++k) {
+    const std::size_t i = (begin + k) % edges;
+    if (belongs[i]) {
+      if (!is_open) pieces.push_back({{curve.vertices[i]}, {curve.points[i]}});
+      pieces.back().vertices.push_back(curve.vertices[i + 1]);
+      pieces.back().points.push_back(curve.points[i + 1]);
+    }
+    is_open = belongs[i];
   }
 }
 
@@ -70,9 +95,15 @@ void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, In
   all.insert(all.end(), of_interfaces.begin(), of_interfaces.end());
   const FeatureCurves found = feature_curves({mesh.positions, {}}, angle_degrees, all);
   FeatureTags tags;
-  for (const FeatureCurve& curve : found.curves) {
-    const auto [low, high] = std::minmax(curve.vertices[0], curve.vertices[1]);
-    if (of_boundary.contains({low, high})) continue;
+  std::vector<FeatureCurve> curves;
+  for (const FeatureCurve& curve : found.curves)
+    add_pieces(
+        curve,
+        [&](Index v, Index w) {
+          return of_interfaces.contains({std::min(v, w), std::max(v, w)});
+        },
+        curves);
+  for (const FeatureCurve& curve : curves) {
     for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
       tags.creases.push_back({curve.vertices[i], curve.vertices[i + 1]});
     for (const Index end : {curve.vertices.front(), curve.vertices.back()}) {

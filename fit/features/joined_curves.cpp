@@ -25,6 +25,7 @@ std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting
     if (path.curve == joined) continue;
     const auto at = std::ranges::find(path.vertices, vertex);
     if (at == path.vertices.begin() || at == path.vertices.end()) continue;
+    if (at + 1 == path.vertices.end()) continue;  // another path that joins there
     std::vector<Vec3> points;
     for (Index v : path.vertices) points.push_back(mesh.positions[v]);
     const double length = polyline_length(points);

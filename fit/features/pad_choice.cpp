@@ -2,6 +2,7 @@
 #include "subvol/fit/features/pads.h"
 #include "subvol/fit/features/patch_fans.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/surface/triangle_geometry.h"
 
@@ -11,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <string>
@@ -29,31 +29,26 @@ constexpr double kFlattestBorder = 150;
 constexpr double kMostAngle = 140, kLeastCellAngle = 42, kLeastFaceAngle = 40;
 /// Weight of an edge between two sets of patches for each of them, against an edge inside one.
 constexpr double kBorderWeight = 0.5;
-/// Distance, as a share of the target's diagonal, at which the directions of curves at a corner are measured: short
-/// enough to see the corner, long enough not to see the triangles of a rounding.
+/// Distance, as a share of the diagonal of all curves, at which the directions of curves at a corner are measured:
+/// short enough to see the corner, long enough not to see the triangles of a rounding.
 constexpr double kDirectionReach = 0.01;
 
 /// Sets of patches on which no pad may end between.
 class PatchSets {
  public:
-  explicit PatchSets(std::size_t patches) : parent_(patches) { std::iota(parent_.begin(), parent_.end(), 0); }
-  Index of(Index patch) const {
-    while (parent_[patch] != patch) patch = parent_[patch];
-    return patch;
-  }
-  void unite(Index a, Index b) {
-    const Index x = of(a), y = of(b);
-    parent_[std::max(x, y)] = std::min(x, y);
-  }
+  explicit PatchSets(std::size_t patches) : sets_(patches) {}
+  /// Returns the least patch of a patch's set.
+  Index of(Index patch) const { return sets_.of(patch); }
+  void unite(Index a, Index b) { sets_.join(a, b); }
   std::vector<Index> members(Index set) const {
     std::vector<Index> patches;
-    for (std::size_t p = 0; p < parent_.size(); ++p)
+    for (std::size_t p = 0; p < sets_.size(); ++p)
       if (of(static_cast<Index>(p)) == set) patches.push_back(static_cast<Index>(p));
     return patches;
   }
 
  private:
-  std::vector<Index> parent_;
+  mutable DisjointSets sets_;  ///< searches shorten its ways
 };
 
 /// How much the sets of patches of one mesh want a pad.

@@ -9,8 +9,6 @@
 
 namespace subvol {
 
-class ClosestPoint;
-
 /// Functions of polylines: at least two points in all of them.
 
 double polyline_length(std::span<const Vec3> points);

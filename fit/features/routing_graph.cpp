@@ -90,6 +90,7 @@ void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
 
 RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve) {
   const double h = graph.edge_length();
+  if (!(h > 0) || !graph.has_sizes()) return {h, h};
   const RoutingGraph::Sizes sizes = graph.sizes_at(sampled_polyline(curve.points, h / 2));
   return {h * sizes.mean, h * sizes.largest};
 }

@@ -39,6 +39,7 @@ class RoutingGraph {
   std::size_t num_vertices() const { return mesh_->num_vertices(); }
   /// h: mean length of the edges, each divided by the mean size of its ends; 0 without edges.
   double edge_length() const { return edge_length_; }
+  bool has_sizes() const { return !sizes_.empty(); }
   double size(Index vertex) const { return sizes_.empty() ? 1 : sizes_[vertex]; }
   /// Returns the mean and the largest size of the vertices that are nearest to some points; at least one point.
   struct Sizes {

@@ -281,7 +281,7 @@ bool SheetPadding::pad_region(int reference) {
   strict.patched.grows_to_shared = false;
   for (const MissedPad& missed : pad_body(strict, references).missed) pad_through_neighbors(reference, missed);
   Body rest = body(references);
-  return pad_body(rest, references).missed.empty();
+  return rest.is_sound && pad_body(rest, references).missed.empty();
 }
 
 /// Puts a padded body back in its place. before: the faces of its sheets before it was padded.

@@ -8,7 +8,9 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <optional>
+#include <utility>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -54,6 +56,35 @@ TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
   CHECK(has_edges_to_follow(stone, 40, true));
   CHECK_FALSE(has_edges_to_follow(stone, 40, false));
   CHECK(edge_crispness(cube, feature_curves(cube, 40)).crisp_share == Approx(1));
+}
+
+TEST_CASE("Edges sharper than a right angle are crisp, whatever way their triangles run") {
+  // A blade with an edge of 10 degrees: each of its sides bends by 5 degrees beside the edge.
+  constexpr double kHalf = 5 * std::numbers::pi / 180;
+  TriangleMesh blade;
+  for (const double y : {0.0, 4.0}) {
+    for (const double x : {0.0, 1.0, 2.0}) {
+      const double bent = x < 2 ? x * std::tan(kHalf) : std::tan(kHalf) + std::tan(2 * kHalf);
+      blade.positions.push_back({x, y, bent});
+      blade.positions.push_back({x, y, -bent});
+    }
+  }
+  const auto quad = [&](Index a, Index b, Index c, Index d) {
+    blade.triangles.push_back({a, b, c});
+    blade.triangles.push_back({a, c, d});
+  };
+  const Index next = 6;  // from one end of the blade to the other
+  quad(0, next, next + 2, 2);
+  quad(2, next + 2, next + 4, 4);
+  quad(0, 3, next + 3, next);
+  quad(3, 5, next + 5, next + 3);
+  quad(4, next + 4, next + 5, 5);
+  const FeatureCurves curves = feature_curves(blade, 40);
+  REQUIRE(curves.curves.size() == 3);  // the edge of the blade, and those of its back
+  CHECK(edge_crispness(blade, curves).crisp_share == Approx(1));
+  std::swap(blade.triangles[0][0], blade.triangles[0][1]);
+  std::swap(blade.triangles[1][0], blade.triangles[1][1]);
+  CHECK(edge_crispness(blade, curves).crisp_share == Approx(1));
 }
 
 TEST_CASE("Faces with vertices of their own are joined, closed parts that touch are not") {

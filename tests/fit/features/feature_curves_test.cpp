@@ -8,9 +8,11 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -88,6 +90,8 @@ TEST_CASE("feature curves refuse angles out of range and corners that do not exi
   TriangleMesh broken = mesh;
   broken.triangles[0][0] = 1000;
   CHECK_THROWS_AS(feature_curves(broken, 40), InputError);
+  for (const std::array<Index, 2> tagged : {std::array<Index, 2>{0, 1000}, {-1, 0}, {2, 2}})
+    CHECK_THROWS_AS(feature_curves(mesh, 40, std::span(&tagged, 1)), InputError);
 }
 
 TEST_CASE("a displaced lattice follows every edge of a cube") {

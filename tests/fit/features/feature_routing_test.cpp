@@ -196,6 +196,29 @@ TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its nei
   CHECK(apart.unfollowed[0].curve == routing.joined[0]);
 }
 
+TEST_CASE("two curves may join a third one at the same vertex") {
+  // The middle one of three paths; the others leave it at its second vertex.
+  VolumeMesh mesh;
+  for (int i = 0; i < 5; ++i) mesh.positions.push_back({static_cast<double>(i), 0, 0});
+  for (const double y : {1.0, -1.0})
+    for (int i = 2; i < 5; ++i) mesh.positions.push_back({static_cast<double>(i), y, 0});
+  SignedFeatures features;
+  const auto add = [&](std::vector<Index> vertices, std::vector<Vec3> points) {
+    features.curves.curves.push_back({std::move(vertices), std::move(points)});
+  };
+  add({10, 11}, {{4, 1, 0}, {0, 0, 0}});  // ends where the next one begins
+  add({11, 12}, {{0, 0, 0}, {4, 0, 0}});
+  add({11, 13}, {{0, 0, 0}, {4, -1, 0}});
+  FeatureRouting routing;
+  routing.paths = {{0, {7, 6, 5, 1}}, {1, {0, 1, 2, 3, 4}}, {2, {1, 8, 9, 10}}};
+  routing.joined = {0, 2};
+  routing.corners = {{11, 0}, {12, 4}, {10, 7}, {13, 10}};
+  const FeatureCurves parts = followed_parts(mesh, features, routing);
+  CHECK(parts.curves[0].points.back().isApprox(Vec3(1, 0, 0)));
+  CHECK(parts.curves[2].points.front().isApprox(Vec3(1, 0, 0)));
+  CHECK(parts.curves[1].points == features.curves.curves[1].points);
+}
+
 TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
   // The cube ends two edges of the lattice beyond it: no vertex is near its corners there.
   constexpr double kEnd = 2;
