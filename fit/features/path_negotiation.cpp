@@ -36,12 +36,14 @@ class Negotiation {
   }
 
   std::vector<std::vector<Index>> run(std::span<const Index> curves, CurveSearch& search) {
+    std::vector<std::uint8_t> is_hopeless(paths_.size(), 0);  // no path is near, whatever the prices
     for (int round = 0; round < kMostRounds; ++round) {
       begin_round(kFirstPrice * std::pow(kGrowth, round));
       for (const Index c : curves) {
-        if (!paths_[c].empty() && !shares(paths_[c])) continue;
+        if (is_hopeless[c] || (!paths_[c].empty() && !shares(paths_[c]))) continue;
         count(paths_[c], -1);
         auto found = search.find(c, priced_);
+        if (round == 0) is_hopeless[c] = !found;
         paths_[c] = found ? std::move(found->path) : std::vector<Index>();
         count(paths_[c], 1);
       }
