@@ -43,7 +43,7 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
 ///
 /// attempts  those that are left, at least one.
 /// best      the best trial so far: distances fall with the square of the cells' size, so it tells which attempt will
-///           be the last. Null: the first attempt with more cells than the first of all.
+///           be the last. If null, the next larger number of cells is expected to be the last.
 double expected_portion(std::span<const AutomaticAttempt> attempts, const AutomaticFitTrial* best,
                         const AutomaticFitOptions& options);
 

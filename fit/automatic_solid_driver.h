@@ -34,7 +34,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// Finds the features that are so small that a distance within the tolerance may be too large there. Those that are
   /// smaller than the mean distance that is aimed at are faults of the surface.
   void find_features();
-  /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
+  /// Makes a template of the target. Returns nothing if there is none (`no_template_` then says so), or if the fit must
+  /// end.
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   /// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing
   /// as `make_template`.

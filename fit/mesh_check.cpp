@@ -115,16 +115,18 @@ bool begins(const char* part, double fraction, const WorkProgress& progress, Mes
   return !check.ended_early;
 }
 
-/// Returns a vertex of each part of a surface whose normals point into the solid that all parts bound together.
+/// Returns a vertex of each part of a surface whose normals point into the solid that all parts bound together; none if
+/// a part is not closed.
 std::vector<Vec3> parts_facing_inward(const TriangleMesh& surface) {
   const SurfaceParts parts = surface_parts(surface);
-  if (std::ranges::find(parts.is_closed, 0) != parts.is_closed.end()) return {};
-  const PartNesting nesting = part_nesting(surface, parts.part, static_cast<int>(parts.num_parts()));
+  const TriangleMesh& mesh = parts.surface.mesh;  // without triangles that have two corners in one place
+  if (parts.num_parts() < 2 || std::ranges::find(parts.is_closed, 0) != parts.is_closed.end()) return {};
+  const PartNesting nesting = part_nesting(mesh, parts.part, static_cast<int>(parts.num_parts()));
   std::vector<Vec3> places;
   for (std::size_t p = 0; p < parts.num_parts(); ++p) {
     if (nesting.faces_out(p)) continue;
     const auto first = std::ranges::find(parts.part, static_cast<int>(p)) - parts.part.begin();
-    places.push_back(surface.positions[surface.triangles[static_cast<std::size_t>(first)][0]]);
+    places.push_back(mesh.positions[mesh.triangles[static_cast<std::size_t>(first)][0]]);
   }
   return places;
 }

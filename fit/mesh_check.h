@@ -87,8 +87,8 @@ struct MeshCheck {
   std::vector<std::array<Index, 2>> intersecting_faces;
   std::size_t num_intersecting_triangle_pairs = 0;           ///< if `kMostIntersectingPairs`: at least that many
   std::size_t num_degenerate_boundary_triangles = 0;         ///< of zero area: not checked for intersections
-  /// A vertex of each closed part of the boundary that faces the wrong way: it bounds a solid inside another solid,
-  /// which no intersection shows. Only looked for if the boundary has several components and does not meet itself.
+  /// Holds a vertex of each part of the boundary that faces the wrong way: the part bounds a solid inside another solid,
+  /// which no intersection shows. It stays empty if the boundary has one component, meets itself, or is not closed.
   std::vector<Vec3> parts_inside_solids;
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary

@@ -48,7 +48,7 @@ class PatchSets {
   }
 
  private:
-  mutable DisjointSets sets_;  ///< searches shorten its ways
+  mutable DisjointSets sets_;  ///< a search shortens the ways to the least members
 };
 
 /// How much the sets of patches of one mesh want a pad.
