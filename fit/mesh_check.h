@@ -87,8 +87,9 @@ struct MeshCheck {
   std::vector<std::array<Index, 2>> intersecting_faces;
   std::size_t num_intersecting_triangle_pairs = 0;           ///< if `kMostIntersectingPairs`: at least that many
   std::size_t num_degenerate_boundary_triangles = 0;         ///< of zero area: not checked for intersections
-  /// Holds a vertex of each part of the boundary that faces the wrong way: the part bounds a solid inside another solid,
-  /// which no intersection shows. It stays empty if the boundary has one component, meets itself, or is not closed.
+  /// Holds a vertex of each part of the boundary that faces the wrong way: the part bounds a solid inside another
+  /// solid, which no intersection shows. It stays empty if the boundary has one component, meets itself, or is not
+  /// closed.
   std::vector<Vec3> parts_inside_solids;
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary
