@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -18,7 +20,7 @@ namespace subvol::internal {
 
 namespace {
 
-/// The angles between the triangles of a surface.
+/// The angles between the triangles of a surface, and its planes.
 class Bends {
  public:
   Bends(const TriangleMesh& mesh, const FeatureCurves& curves) {
@@ -27,10 +29,11 @@ class Bends {
     for (const auto& triangle : mesh.triangles) {
       const auto& [a, b, c] = triangle;
       if (a == b || b == c || c == a) continue;
-      const Vec3 area = doubled_area_vector(mesh, triangle);
-      area_ += area.norm() / 2;
-      normals.push_back(area.normalized());
+      const Vec3 doubled_area = doubled_area_vector(mesh, triangle);
+      areas_.push_back(doubled_area.norm() / 2);
+      normals.push_back(doubled_area.normalized());
       triangles.push_back(triangle);
+      for (const Index v : triangle) box_.extend(mesh.positions[v]);
     }
     sides_ = sorted_half_edges(triangles, mesh.positions.size());
     edges_of_.resize(triangles.size());
@@ -40,12 +43,21 @@ class Bends {
         edges_of_[side.triangle][num_edges[side.triangle]++] = static_cast<Index>(edges_.size());
       edges_.push_back({sides, sides.size() == 2 ? angle_between(sides[0], sides[1], normals) : 0, false});
     });
+    find_planes(normals);
     for (const FeatureCurve& curve : curves.curves)
       for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
         if (const Index e = find(curve.vertices[i], curve.vertices[i + 1]); e != kNoIndex) edges_[e].on_curve = true;
   }
 
-  double area() const { return area_; }
+  double area() const { return std::accumulate(areas_.begin(), areas_.end(), 0.0); }
+
+  /// Returns true if a plane of the surface ends at an edge. Edges between two planes count as well.
+  bool bounds_plane(Index v, Index w) const {
+    const Index edge = find(v, w);
+    return edge != kNoIndex && std::ranges::any_of(edges_[edge].sides, [&](const SurfaceHalfEdge& side) {
+             return in_plane_[side.triangle];
+           });
+  }
 
   bool is_crisp(Index v, Index w) const {
     constexpr double kMostShare = 1.0 / 3;
@@ -64,6 +76,36 @@ class Bends {
     double angle;  ///< between its two triangles, in degrees; 0 if there are not two
     bool on_curve;
   };
+
+  /// Marks the triangles of planes: connected triangles, two or more, whose normals are those of the largest one.
+  void find_planes(std::span<const Vec3> normals) {
+    constexpr double kSameNormal = 0.5;  // degrees; normals of coordinates in single precision differ by less
+    constexpr double kLeastArea = 1e-4;  // share of the squared diagonal
+    std::vector<Index> by_area(areas_.size());
+    std::iota(by_area.begin(), by_area.end(), Index{0});
+    std::ranges::stable_sort(by_area, std::greater(), [&](Index t) { return areas_[t]; });
+    in_plane_.assign(areas_.size(), false);
+    std::vector<bool> visited(areas_.size(), false);
+    std::vector<Index> patch;
+    for (const Index seed : by_area) {
+      if (visited[seed]) continue;
+      visited[seed] = true;
+      patch = {seed};
+      double area = 0;
+      for (std::size_t i = 0; i < patch.size(); ++i) {
+        area += areas_[patch[i]];
+        for (const Index e : edges_of_[patch[i]])
+          for (const SurfaceHalfEdge& side : edges_[e].sides) {
+            const double angle = angle_degrees_between(normals[seed], normals[side.triangle]);
+            if (visited[side.triangle] || std::min(angle, 180 - angle) > kSameNormal) continue;
+            visited[side.triangle] = true;
+            patch.push_back(side.triangle);
+          }
+      }
+      if (patch.size() < 2 || area <= kLeastArea * box_.diagonal().squaredNorm()) continue;
+      for (const Index t : patch) in_plane_[t] = true;
+    }
+  }
 
   /// Returns the angle between two triangles, whatever their orientation.
   static double angle_between(const SurfaceHalfEdge& a, const SurfaceHalfEdge& b, std::span<const Vec3> normals) {
@@ -84,7 +126,9 @@ class Bends {
   std::vector<SurfaceHalfEdge> sides_;
   std::vector<Edge> edges_;                     ///< ascending by their ends
   std::vector<std::array<Index, 3>> edges_of_;  ///< of each triangle that is no sliver with two equal corners
-  double area_ = 0;
+  std::vector<double> areas_;                   ///< of those triangles
+  std::vector<bool> in_plane_;                  ///< for those triangles
+  Eigen::AlignedBox3d box_;
 };
 
 /// Diagonals of the bounding boxes of the parts of a surface that triangles connect.
@@ -115,19 +159,27 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   if (curves.empty()) return result;
   const Bends bends(mesh, curves);
   PartDiagonals diagonals(mesh);
-  double all = 0, crisp = 0, long_crisp = 0;
+  double all = 0, crisp = 0, long_crisp = 0, planar = 0;
   for (const FeatureCurve& curve : curves.curves) {
     double crisp_here = 0;
-    for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
-      if (bends.is_crisp(curve.vertices[i], curve.vertices[i + 1]))
-        crisp_here += (curve.points[i + 1] - curve.points[i]).norm();
+    for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
+      const double length = (curve.points[i + 1] - curve.points[i]).norm();
+      if (bends.is_crisp(curve.vertices[i], curve.vertices[i + 1])) crisp_here += length;
+      if (bends.bounds_plane(curve.vertices[i], curve.vertices[i + 1])) planar += length;
+    }
     const double length = curve.length();
     all += length;
     crisp += crisp_here;
     if (length > kLong * diagonals.at(curve.vertices[0]) && crisp_here > kMost * length) long_crisp += length;
   }
-  if (all > 0) result.crisp_share = crisp / all;
-  if (bends.area() > 0) result.relative_length = long_crisp / std::sqrt(bends.area());
+  if (all > 0) {
+    result.crisp_share = crisp / all;
+    result.planar_share = planar / all;
+  }
+  if (const double area = bends.area(); area > 0) {
+    result.relative_length = long_crisp / std::sqrt(area);
+    result.relative_planar_length = planar / std::sqrt(area);
+  }
   return result;
 }
 

@@ -58,6 +58,28 @@ TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
   CHECK(edge_crispness(cube, feature_curves(cube, 40)).crisp_share == Approx(1));
 }
 
+TEST_CASE("edges that bound planes are followed beside coarse roundings") {
+  // A cylinder of ten sides: its sides bend by 36 degrees, more than a third of the angle at its rims.
+  constexpr int kSides = 10;
+  TriangleMesh cylinder;
+  for (int i = 0; i < kSides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    for (const double z : {0.0, 1.0}) cylinder.positions.push_back({std::cos(angle), std::sin(angle), z});
+  }
+  for (Index i = 0; i < kSides; ++i) {
+    const Index a = 2 * i, b = 2 * ((i + 1) % kSides);
+    cylinder.triangles.push_back({a, b, b + 1});
+    cylinder.triangles.push_back({a, b + 1, a + 1});
+    if (i == 0 || i == kSides - 1) continue;
+    cylinder.triangles.push_back({0, b, a});
+    cylinder.triangles.push_back({1, a + 1, b + 1});
+  }
+  const EdgeCrispness crispness = edge_crispness(cylinder, feature_curves(cylinder, 40));
+  CHECK(crispness.crisp_share == Approx(0).margin(1e-12));
+  CHECK(crispness.planar_share == Approx(1));
+  CHECK(has_edges_to_follow(cylinder, 40, false));
+}
+
 TEST_CASE("Edges sharper than a right angle are crisp, whatever way their triangles run") {
   // A blade with an edge of 10 degrees: each of its sides bends by 5 degrees beside the edge.
   constexpr double kHalf = 5 * std::numbers::pi / 180;
