@@ -68,12 +68,6 @@ std::function<bool(double)> AutomaticDriver::begin_template() {
   };
 }
 
-void AutomaticDriver::note_end_in_template() {
-  if (!runner_.in_time("the template", result_.report)) return;
-  result_.report.stop_reason = StopReason::cancelled;
-  result_.report.explanation = "cancelled in the template";
-}
-
 QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule schedule) {
   // As in the merit of a trial, poor cells cost more than a place that is slightly too far. With the weights of other
   // lifts, y-belt-idler kept a scaled Jacobian of 0.28 rather than a largest distance of 0.58 % for 0.52.
@@ -180,7 +174,10 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0, fruitless = 0; round < kMostRounds; ++round, surface *= kLess) {
     const std::vector<Index> cells = hopeless_cells();
-    if (runner_.is_to_end()) return false;
+    if (runner_.is_to_end()) {
+      note_end_in("the relaxation of hopeless cells");
+      return false;
+    }
     fruitless = cells.size() < fewest ? 0 : fruitless + 1;
     fewest = std::min(fewest, cells.size());
     if (cells.empty() || fruitless == kFruitless) break;
@@ -246,7 +243,8 @@ bool AutomaticDriver::polish() {
 
 bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,
                                    std::optional<CreaseDistance> edges, std::span<const UnfollowedCurve> unfollowed) {
-  trial.least_share = state_.cells.least_share;
+  trial.least_share = state_.is_judged() ? state_.cells.least_share
+                                         : std::clamp(quality.min_scaled_jacobian / options_.quality, 0.0, 1.0);
   if (edges) edges->farthest = target_.normalization.from_unit({edges->farthest})[0];
   std::vector<MissedEdge> missed = missed_edges(unfollowed, target_.normalization);
   trial.long_edges_lost = num_long_edges_lost(missed);
@@ -257,7 +255,8 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
   return true;
 }
 
-AutomaticFitResult AutomaticDriver::finish() {
+AutomaticFitResult AutomaticDriver::finish(bool going) {
+  if (!going && result_.report.explanation.empty()) note_end_in("the fit");
   if (options_.cells && result_.mesh.num_cells() > *options_.cells)
     result_.report.warnings.push_back(
         formatted("the result has %zu cells, more than the %zu allowed: no template with "

@@ -68,8 +68,8 @@ class AutomaticDriver {
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   /// Begins the part of an attempt that makes its template. Returns what to call with its share that is done.
   std::function<bool(double)> begin_template();
-  /// Tells in the report that the fit ended in a template.
-  void note_end_in_template();
+  /// Tells in the report that the fit ended in this work.
+  void note_end_in(const char* work) { runner_.give_up(work, result_.report); }
   /// Makes the present mesh the cage of the mesh that it is subdivided to, which is then the present one.
   virtual void begin_cage();
   /// Fits the present mesh at one level. what: is added to its name in the report.
@@ -110,7 +110,8 @@ class AutomaticDriver {
   bool keep_if_best(AutomaticFitTrial trial, const QualityReport& quality, std::optional<CreaseDistance> edges,
                     std::span<const UnfollowedCurve> unfollowed);
   /// Brings the result into the target's coordinates.
-  AutomaticFitResult finish();
+  /// going  false if the fit was ended early.
+  AutomaticFitResult finish(bool going);
 
   AutomaticFitOptions options_;
   FitTarget target_;

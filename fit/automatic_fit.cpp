@@ -197,7 +197,11 @@ bool AutomaticFit::run_graded() {
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
                                                     target_.normalization.from_unit(std::move(places)), most, stop);
-  if (!graded) return !stop.is_stopped();
+  if (stop.is_stopped()) {
+    note_end_in("the grid with small cells");
+    return false;
+  }
+  if (!graded) return true;
   target_.normalization.take_in(graded->mesh);
   layout_.reset();
   cage_.reset();
@@ -300,7 +304,7 @@ AutomaticFitResult AutomaticFit::run() {
     going = polish();
   }
   if (going) conclude_fit(result_, options_);
-  return finish();
+  return finish(going);
 }
 
 }  // namespace

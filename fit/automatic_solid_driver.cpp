@@ -54,7 +54,7 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOpti
   if (!made.cancelled && made.templates.empty() && !diagnosis_)
     diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
   if (made.cancelled || (diagnosis_ && diagnosis_->is_cancelled)) {
-    note_end_in_template();
+    note_end_in("the template");
     return std::nullopt;
   }
   if (made.templates.empty()) {
@@ -229,8 +229,12 @@ void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
 
 std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   std::vector<Fault> faults;
-  if (best().self_intersections != std::size_t{0})
-    for (const Index c : cells_that_meet(result_.mesh)) faults.push_back({c});
+  if (best().self_intersections != std::size_t{0}) {
+    std::vector<Index> meeting = cells_that_meet(result_.mesh);
+    std::ranges::sort(meeting);
+    meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());
+    for (const Index c : meeting) faults.push_back({c});
+  }
   const std::vector<double> least = measure_quality(result_.mesh).cell_minima;
   std::vector<Index> poor = best_start_.poor;
   std::ranges::stable_sort(poor, std::less{}, [&](Index c) { return least[c]; });
@@ -239,7 +243,8 @@ std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   for (const Index c : best_start_.far) faults.push_back({c});
   if (best_start_.kind == AutomaticAttempt::Kind::smooth) return faults;
   const VolumeMesh& grid = best_start_.grid.mesh;
-  for (Fault& fault : faults) fault = cells_at(grid, best_start_.fitted, result_.mesh, fault);
+  const CellCenters centers(grid, best_start_.fitted);
+  for (Fault& fault : faults) fault = centers.nearest(result_.mesh, fault);
   const BoundaryCells cells(grid, best_start_.fitted);
   std::vector<std::vector<Vec3>> lost = best_start_.lost;
   std::ranges::stable_sort(lost, std::greater{}, [](const std::vector<Vec3>& curve) { return polyline_length(curve); });

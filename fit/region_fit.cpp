@@ -131,7 +131,7 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   options.progress = begin_template();
   RegionTemplateResult made = region_template(original_, options);
   if (made.cancelled) {
-    note_end_in_template();
+    note_end_in("the template");
     return std::nullopt;
   }
   if (!made.made) {
@@ -379,7 +379,7 @@ AutomaticFitResult RegionFit::run() {
   if (going) going = polish();
   if (going) conclude();
   if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
-  return finish();
+  return finish(going);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <new>
 #include <optional>
 #include <utility>
@@ -31,6 +32,7 @@ class SubdivisionFit : SubdivisionDriver {
   bool run_levels();
   bool run_level();
   bool run_stages();
+  bool improve_finest(const FitSnapshot& start);
   bool lower_lambda(std::size_t pairs);
   bool raise_quality();
   bool flatten_interfaces();
@@ -171,9 +173,28 @@ bool SubdivisionFit::run_stages() {
     if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;
   }
   if (!finest()) return true;
+  return improve_finest(start);
+}
+
+/// Improves the finest mesh step by step. If memory runs out, the state before the step is the result.
+/// start  of the level. Returns false if the fit must end.
+bool SubdivisionFit::improve_finest(const FitSnapshot& start) {
   std::optional<std::size_t> pairs = intersecting_pairs();
-  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs) && fit_all_samples() &&
-         raise_quality() && flatten_interfaces();
+  if (!pairs) return false;
+  const std::array<std::function<bool()>, 5> steps{
+      [&] { return unfold(start, kMostUnfoldingLambda, *pairs); }, [&] { return lower_lambda(*pairs); },
+      [&] { return fit_all_samples(); }, [&] { return raise_quality(); }, [&] { return flatten_interfaces(); }};
+  for (const std::function<bool()>& step : steps) {
+    FitSnapshot before = snapshot();
+    try {
+      if (!or_back(before, step)) return false;
+    } catch (const std::bad_alloc&) {
+      result_.report.stop_reason = StopReason::memory_limit;
+      result_.report.explanation = formatted("no memory was left to improve level %d", number_);
+      return false;
+    }
+  }
+  return true;
 }
 
 bool SubdivisionFit::run_level() {

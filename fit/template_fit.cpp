@@ -39,7 +39,12 @@ AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions 
     const bool is_ended = reason != StopReason::converged && reason != StopReason::tolerance_missed;
     const auto merit = [](const AutomaticFitResult& result) { return result.trials[result.chosen].merit; };
     const bool is_made = !made.trials.empty();
-    if (!best || (is_made && (best->trials.empty() || merit(made) < merit(*best)))) best = std::move(made);
+    if (!best || (is_made && (best->trials.empty() || merit(made) < merit(*best)))) {
+      best = std::move(made);
+    } else if (reason == StopReason::cancelled) {
+      best->report.stop_reason = reason;
+      best->report.explanation = std::move(made.report.explanation);
+    }
     if (is_ended || (is_made && is_good_enough(best->trials[best->chosen]))) break;
   }
   if (best->mesh.num_cells() > 0) FollowedCreases().keep_from_folding(best->mesh);

@@ -98,15 +98,17 @@ std::vector<Index> BoundaryCells::near(std::span<const Vec3> points) const {
   return ascending(std::move(cells));
 }
 
-std::vector<Index> cells_at(const VolumeMesh& mesh, std::span<const Vec3> positions, const VolumeMesh& other,
-                            std::span<const Index> cells_of_other) {
-  if (mesh.num_cells() == 0) return {};
+CellCenters::CellCenters(const VolumeMesh& mesh, std::span<const Vec3> positions) : is_empty_(mesh.num_cells() == 0) {
   std::vector<Vec3> centers;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) centers.push_back(cell_center(mesh, positions, c));
-  const SiteTree tree(centers);
+  if (!is_empty_) tree_ = SiteTree(centers);
+}
+
+std::vector<Index> CellCenters::nearest(const VolumeMesh& other, std::span<const Index> cells_of_other) const {
   std::vector<Index> cells;
+  if (is_empty_) return cells;
   for (const Index c : cells_of_other)
-    cells.push_back(tree.site(tree.nearest(cell_center(other, other.positions, static_cast<std::size_t>(c))).place));
+    cells.push_back(tree_.site(tree_.nearest(cell_center(other, other.positions, static_cast<std::size_t>(c))).place));
   return ascending(std::move(cells));
 }
 

@@ -51,10 +51,19 @@ class BoundaryCells {
   SiteTree tree_;
 };
 
-/// Returns the cells whose centers are nearest to those of other cells, ascending.
-/// positions  of the mesh's vertices, in the coordinates of the other mesh.
-std::vector<Index> cells_at(const VolumeMesh& mesh, std::span<const Vec3> positions, const VolumeMesh& other,
-                            std::span<const Index> cells_of_other);
+/// Finds cells of a mesh by the centers of other cells.
+class CellCenters {
+ public:
+  /// positions  of the mesh's vertices, in the coordinates of the other mesh.
+  CellCenters(const VolumeMesh& mesh, std::span<const Vec3> positions);
+
+  /// Returns the cells whose centers are nearest to those of some cells of another mesh, ascending.
+  std::vector<Index> nearest(const VolumeMesh& other, std::span<const Index> cells_of_other) const;
+
+ private:
+  bool is_empty_;
+  SiteTree tree_;
+};
 
 /// Returns the mean size of the cells at each vertex; empty if the sizes are.
 std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double> sizes);

@@ -29,8 +29,9 @@ VolumeMesh smooth_refinement(const VolumeMesh& mesh) {
         share[v] *= pass < kHalvings ? 0.5 : 0;
       }
     }
-    if (good) break;
+    if (good) return fine;
   }
+  fine.positions = split;
   return fine;
 }
 

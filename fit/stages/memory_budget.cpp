@@ -10,14 +10,19 @@ namespace subvol::internal {
 
 bool MemoryBudget::allows(std::size_t size) {
   if (limit_ <= 0) return true;
-  const double held = static_cast<double>(held_memory_bytes());
-  if (size_ > 0) {
-    const double taken = static_cast<double>(peak_memory_bytes()) - held_ - kMemoryOfAnyPart;
-    rate_ = std::max(rate_, taken / size_);
+  const double held = static_cast<double>(held_memory_bytes()), peak = static_cast<double>(peak_memory_bytes());
+  if (size_ > 0 && peak > peak_) {  // else the last part has taken no more than what came before
+    const double taken = peak - held_;
+    if (is_first_)
+      fixed_ = std::max(fixed_, taken - rate_ * size_);
+    else
+      rate_ = std::max(rate_, (taken - fixed_) / size_);
   }
+  is_first_ = size_ == 0;
   held_ = held;
+  peak_ = peak;
   size_ = static_cast<double>(size);
-  expected_ = held + kMemoryOfAnyPart + rate_ * size_;
+  expected_ = held + fixed_ + rate_ * size_;
   return expected_ <= limit_;
 }
 

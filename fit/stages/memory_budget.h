@@ -6,13 +6,21 @@
 
 namespace subvol::internal {
 
+/// Bytes that a part takes regardless of its size, for samples of the target and search trees (30 MB were measured).
+inline constexpr double kMemoryOfAnyPart = 40e6;
+/// Bytes per hex of a level; 3.8 to 4.7 kB were measured from 40 000 to 360 000 cells.
+inline constexpr double kMemoryOfLevelCell = 6e3;
+/// Bytes per node of curved cells; 5 to 8 kB were measured from order 4 to order 8.
+inline constexpr double kMemoryOfNode = 8e3;
+
 /// Predicts if the next part of a fit, a level or an order, fits into the memory that the process may use.
 ///
 /// A part takes memory roughly in proportion to its size (number of cells, or of nodes of curved cells):
 ///
-///   expected = held now + kMemoryOfAnyPart + rate * size
+///   expected = held now + fixed + rate * size
 ///
-/// The rate starts at a measured bound and rises if the previous part took more.
+/// Both figures start at measured bounds. What the first part takes beyond them is fixed: its size is small, and large
+/// targets take memory at any size. What a later part takes beyond them raises the rate.
 class MemoryBudget {
  public:
   /// limit_bytes  limit for the process; 0: no limit.
@@ -26,14 +34,9 @@ class MemoryBudget {
 
  private:
   double limit_, rate_, expected_ = 0;
-  double held_ = 0, size_ = 0;  ///< values at the start of the last part
+  double fixed_ = kMemoryOfAnyPart;        ///< bytes of a part whatever its size
+  double held_ = 0, peak_ = 0, size_ = 0;  ///< values at the start of the last part; size 0: none has begun
+  bool is_first_ = true;                   ///< the last part was the first one
 };
-
-/// Bytes that a part takes regardless of its size, for samples of the target and search trees (30 MB were measured).
-inline constexpr double kMemoryOfAnyPart = 40e6;
-/// Bytes per hex of a level; 3.8 to 4.7 kB were measured from 40 000 to 360 000 cells.
-inline constexpr double kMemoryOfLevelCell = 6e3;
-/// Bytes per node of curved cells; 5 to 8 kB were measured from order 4 to order 8.
-inline constexpr double kMemoryOfNode = 8e3;
 
 }  // namespace subvol::internal

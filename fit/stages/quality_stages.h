@@ -116,9 +116,13 @@ class QualityStages {
 
   /// A state that the lift reached.
   struct State {
+    static constexpr double kNotJudged = -1e300;
     QualityEnergy::State cells;
-    double merit = -1e300;           ///< see `LiftMerit`. 1: all aims are reached
+    double merit = kNotJudged;       ///< see `LiftMerit`. 1: all aims are reached
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending
+
+    /// False if the stages were ended before the lift: then the figures of the cells are not those of a mesh.
+    bool is_judged() const { return merit > kNotJudged; }
   };
 
   /// Runs all stages, then the lift: on the whole mesh while many cells are poor, then patch by patch (`QualityPatch`).

@@ -70,6 +70,9 @@ class StageRunner {
   /// Sets the report's stop reason and explanation for a fit that has run all its stages, given its mean distance.
   void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;
 
+  /// Sets the report's stop reason, time limit or cancellation, for `work` that was interrupted.
+  void give_up(const std::string& work, FitReport& report) const;
+
   /// Returns true if the current work must be interrupted: the time is over, or the caller cancels.
   bool is_to_end() const { return is_over() || (options_.cancelled && options_.cancelled()); }
 
@@ -79,8 +82,6 @@ class StageRunner {
   using Clock = std::chrono::steady_clock;
 
   bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
-  /// Sets the report's stop reason, time limit or cancellation, for `work` that was interrupted.
-  void give_up(const std::string& work, FitReport& report) const;
   /// Minimizes from the stage's x, continuing the steps that its result already records.
   void solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const;
 

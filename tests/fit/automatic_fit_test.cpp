@@ -7,12 +7,16 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
+#include "tests/support/feature_fixtures.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -207,6 +211,26 @@ TEST_CASE("An automatic fit that ends early gives what it has, or nothing") {
   options.progress = {};
   options.time_limit_seconds = 1e-6;
   CHECK(fit_automatically(ball, options).report.stop_reason == StopReason::time_limit);
+}
+
+TEST_CASE("An automatic fit says that it was canceled, wherever that was", "[slow]") {
+  // A quality that is out of reach leads through all attempts: grids with small cells, refinements, relaxations.
+  const auto [target, angle] = GENERATE(std::pair(test::cube_surface(4, true), std::optional<double>()),
+                                        std::pair(test::tetrahedron_surface(), std::optional<double>(40)));
+  AutomaticFitOptions options{.cells = 400, .quality = kMostQuality, .crease_angle_degrees = angle};
+  std::atomic<int> questions = 0;
+  int most = std::numeric_limits<int>::max();
+  options.cancelled = [&] { return ++questions > most; };
+  fit_automatically(target, options);
+  const int all = questions;
+  REQUIRE(all > 20);
+  for (const double share : {0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
+    questions = 0;
+    most = static_cast<int>(share * all);
+    const AutomaticFitResult result = fit_automatically(target, options);
+    CHECK(result.report.stop_reason == StopReason::cancelled);
+    CHECK(result.report.explanation.substr(0, 12) == "cancelled in");
+  }
 }
 
 TEST_CASE("An automatic fit says so if it needs more cells than allowed") {

@@ -51,7 +51,7 @@ TEST_CASE("Cells are found by points near the boundary and by cells of another m
   CHECK(cells.near(std::vector<Vec3>{corner, corner}).size() == 1);
   const Vec3 on_face = (grid.positions[grid.cell(5)[0]].array() * Vec3(1, 1, 0).array()).matrix();
   CHECK(cells.near(std::vector<Vec3>{on_face}).size() == 4);
-  CHECK(cells_at(grid, grid.positions, other, std::vector<Index>{0, 0, 1}).size() == 2);
+  CHECK(CellCenters(grid, grid.positions).nearest(other, std::vector<Index>{0, 0, 1}).size() == 2);
 }
 
 TEST_CASE("Cells between small and large ones have caps", "[local_cells]") {
