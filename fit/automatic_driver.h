@@ -13,6 +13,7 @@
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>
@@ -65,7 +66,10 @@ class AutomaticDriver {
     share_at_end_ = done + portion * (1 - done);
   }
   /// Begins a part of the attempt that takes this portion of what is left of it.
-  void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
+  /// forecast: in steps; parts without stages and lifts, such as relaxations, count as one.
+  void begin_part(double portion, double forecast) {
+    runner_.work().begin_portion(portion, share_at_end_, std::max(forecast, 1.0));
+  }
   /// Begins the part of an attempt that makes its template. Returns what to call with its share that is done.
   std::function<bool(double)> begin_template();
   /// Tells in the report that the fit ended in this work.

@@ -222,8 +222,13 @@ bool AutomaticFit::run_refined() {
   const double most_cells =
       options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(before.cells);
   const double room = most_cells * static_cast<double>(base.num_cells()) / static_cast<double>(before.cells);
+  SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> refined =
-      refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room));
+      refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room), &stop);
+  if (stop.is_stopped()) {
+    note_end_in("the refinement of cells");
+    return false;
+  }
   if (!refined) return true;
   AutomaticFitTrial trial{.template_cells = before.template_cells,
                           .through_planes = before.through_planes,

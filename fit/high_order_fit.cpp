@@ -127,6 +127,8 @@ bool HighOrderFit::run_first_orders(int last) {
     states_ = std::move(best->states);
     starts_ = std::move(best->starts);
     try_ = best->number;
+    order_ = last;
+    mean_.reset();
     report_.undo_stages(stages_before, best->stages_begin);
     report_.undo_stages(best->stages_end, report_.stages.size());
   };

@@ -335,16 +335,24 @@ std::string label_of(int reference, const RegionReport& report) {
   return std::to_string(reference);
 }
 
+/// Of many regions and interfaces, the first ones are listed; the report in JSON has all.
 void append_regions(std::string& text, const RegionReport& report) {
-  for (const RegionQuality& region : report.regions)
+  static constexpr std::size_t kMostListed = 20;
+  const auto listed = [](const auto& all) { return std::span(all).first(std::min(all.size(), kMostListed)); };
+  const auto append_rest = [&](std::size_t all, const char* what) {
+    if (all > kMostListed) append(text, "%-19s and %zu more %s\n", "", all - kMostListed, what);
+  };
+  for (const RegionQuality& region : listed(report.regions))
     append(text, "region %-12s %zu cells, volume %.6g, scaled Jacobian min %.4f\n",
            label_of(region.reference, report).c_str(), region.num_cells, region.volume, region.min_scaled_jacobian);
-  for (const InterfaceArea& interface : report.interfaces) {
+  append_rest(report.regions.size(), "regions");
+  for (const InterfaceArea& interface : listed(report.interfaces)) {
     const std::string sides =
         label_of(interface.references[0], report) + " and " + label_of(interface.references[1], report);
     append(text, "interface           between %s: %zu faces, area %.6g\n", sides.c_str(), interface.num_faces,
            interface.area);
   }
+  append_rest(report.interfaces.size(), "interfaces");
 }
 
 }  // namespace

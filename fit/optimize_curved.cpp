@@ -320,7 +320,8 @@ CurvedOptimizeResult optimize_curved(const HighOrderMesh& mesh, const VolumeMesh
   require_no_pyramids(mesh.space.kinds(), "mesh: pyramids cannot be curved");
   if (!std::ranges::all_of(mesh.coefficients, [](const Vec3& x) { return x.allFinite(); }))
     throw InputError("mesh: coefficients must be finite");
-  if (labels.kinds.size() != mesh.space.num_cells() || labels.num_vertices() != mesh.space.num_vertices())
+  const VolumeMesh cells = mesh.straight_sided();
+  if (labels.kinds != cells.kinds || labels.cell_vertices != cells.cell_vertices)
     throw InputError("optimize_curved: the labels belong to other cells");
   return CurvedOptimizer(mesh, labels, options).run(mesh);
 }

@@ -247,33 +247,37 @@ bool MeshOptimizer::attempt(double least_jacobian) {
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
+  if (!going) return false;
   flatten(least_jacobian);
   keep_volumes();
-  return going;
+  return true;
 }
 
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   measure_start();
   const Measured start = measure();
   std::vector<Vec3> start_positions = mesh_.positions;
+  const std::size_t warnings_before = report_.warnings.size();
   bool going = attempt(start.least_jacobian);
   while (going && keeps_volumes() && !interfaces_.empty() && held_ != Held::sheets && changes_volumes()) {
     report_.undo_stages(0, report_.stages.size());
     mesh_.positions = start_positions;
     mesh_.tags = original.tags;
+    report_.warnings.resize(warnings_before);
     held_ = static_cast<Held>(static_cast<int>(held_) + 1);
     going = attempt(start.least_jacobian);
   }
-  if (held_ >= Held::interfaces)
-    report_.warnings.push_back(
-        formatted("%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
-                  held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * kMostVolumeChange));
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {
     result.mesh.positions = target_.normalization.from_unit(mesh_.positions);
+    if (held_ >= Held::interfaces)
+      report_.warnings.push_back(
+          formatted("%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
+                    held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * kMostVolumeChange));
   } else {
     mesh_.positions = std::move(start_positions);
+    report_.warnings.resize(warnings_before);
     report_.undo_stages(0, report_.stages.size());
     gains_ended_ = true;
   }

@@ -159,14 +159,18 @@ bool SubdivisionDriver::start_level() {
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
   const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
+  std::vector<Vec3> safe, wanted;  // the nodes at t = 0 and t = 1
   const auto feasible = [&](double t) {
-    const SparseMap map = blend(level_.safe_nodes, nodes, t);
-    const std::vector<Index> failing = certify(map.apply(unknowns_), level_.mesh).not_certified;
+    std::vector<Vec3> x(wanted.size());
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = (1 - t) * safe[i] + t * wanted[i];
+    const std::vector<Index> failing = certify(x, level_.mesh).not_certified;
     return std::includes(failing_before.begin(), failing_before.end(), failing.begin(), failing.end());
   };
   Stage stage = schedule_.continuation;
   double t = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
+    safe = level_.safe_nodes.apply(unknowns_);
+    wanted = nodes.apply(unknowns_);
     double next = 1;
     while (next > t && !feasible(next)) {
       next = t + kBackOff * (next - t);

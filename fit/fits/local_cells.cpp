@@ -60,14 +60,14 @@ Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::s
 }
 
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
-                                           std::span<const Fault> faults, std::size_t most_cells) {
+                                           std::span<const Fault> faults, std::size_t most_cells, SearchStop* stop) {
   // A row of cells that is cut adds about a hundred cells for each of its own, a block of them 26.
   constexpr double kLeastAdded = 26, kLess = 0.7;
   const double room = static_cast<double>(most_cells) - static_cast<double>(mesh.num_cells());
   for (double most = room / kLeastAdded; most >= 1; most *= kLess) {
     std::vector<char> chosen(mesh.num_cells(), 0);
     most = std::min(most, static_cast<double>(choose(faults, most, chosen)));
-    if (most < 1) break;
+    if (most < 1 || (stop && stop->is_stopped())) break;
     SizedMesh refined = refined_at(mesh, sizes, chosen);
     if (refined.mesh.num_cells() <= most_cells) return refined;
   }

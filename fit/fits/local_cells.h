@@ -6,6 +6,7 @@
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/sparse_map.h"
+#include "subvol/templates/search_stop.h"
 
 #include <cstddef>
 #include <optional>
@@ -28,10 +29,12 @@ using Fault = std::vector<Index>;
 /// mesh    hexes; parts of warped ones may be inverted in the result.
 /// sizes   of its cells, or empty; those of the result are smaller by the third root of the number of parts.
 /// faults  the most important first.  most_cells  that the result may have.
-/// returns nothing if there is no room for one, or no fault has a cell.
+/// stop    asked before each refinement; null: it is not stopped.
+/// returns nothing if there is no room for one, if no fault has a cell, or if it was stopped.
 /// Cost: up to two dozen refinements.
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
-                                           std::span<const Fault> faults, std::size_t most_cells);
+                                           std::span<const Fault> faults, std::size_t most_cells,
+                                           SearchStop* stop = nullptr);
 
 /// Returns the mean of a cell's corners.  positions  of the mesh's vertices.
 Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t cell);

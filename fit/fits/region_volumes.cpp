@@ -130,11 +130,11 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
           else at->second += sign * gradients[f].of_corner[i];
         }
       }
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(num_regions, num_regions);
+    std::vector<MatrixEntry> entries;
     for (std::size_t v = 0; v < by_vertex.size(); ++v)
       for (const auto& [r, g] : by_vertex[v])
-        for (const auto& [s, h] : by_vertex[v]) matrix(r, s) += g.dot(projectors[v] * h) / area[v];
-    const Eigen::VectorXd factors = least_norm_solution(matrix, missing);
+        for (const auto& [s, h] : by_vertex[v]) entries.push_back({r, s, g.dot(projectors[v] * h) / area[v]});
+    const Eigen::VectorXd factors = least_norm_solution(entries, missing);
     if (!factors.allFinite()) break;
     for (std::size_t v = 0; v < by_vertex.size(); ++v) {
       if (by_vertex[v].empty()) continue;

@@ -54,7 +54,8 @@ CornerQuality measure_corner_quality(const VolumeMesh& mesh) {
       const Vec3 u = (mesh.positions[cell[i]] - x).stableNormalized(),
                  v = (mesh.positions[cell[j]] - x).stableNormalized(),
                  w = (mesh.positions[cell[k]] - x).stableNormalized();
-      least = std::min(least, factor_of(mesh.kinds[c]) * u.cross(v).dot(w));
+      const double here = factor_of(mesh.kinds[c]) * u.cross(v).dot(w);
+      if (!(here >= least)) least = std::isfinite(here) ? here : -1;
     }
     quality.cell_minima[c] = std::max(-1.0, least);
   }

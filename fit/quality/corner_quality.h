@@ -22,8 +22,8 @@ struct CornerQuality {
 /// of eight equal edges, whose apex does not count. It differs
 /// from that of `measure_quality` in the lengths that it is divided by, except in hexes.
 ///
-/// returns  values in [-1, 1] for each cell, 0 if an edge has no length. The mesh must have valid vertex numbers.
-/// Parallel; same bits for any number of threads.
+/// returns  values in [-1, 1] for each cell, 0 if an edge has no length, -1 if a coordinate is not finite. The mesh
+/// must have valid vertex numbers. Parallel; same bits for any number of threads.
 CornerQuality measure_corner_quality(const VolumeMesh& mesh);
 
 }  // namespace subvol

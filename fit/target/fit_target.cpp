@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace subvol::internal {
 
@@ -131,6 +132,46 @@ void FitTarget::add_interfaces() {
   surface = TargetSurface(all, {.volume = surface.volume()});
 }
 
+namespace {
+
+/// The triangles of a surface, sorted by group.
+class TrianglesByGroup {
+ public:
+  /// Both must outlive this. groups: one for each triangle.
+  TrianglesByGroup(const TriangleMesh& surface, std::span<const Index> groups) : surface_(surface), groups_(groups) {
+    order_.resize(groups.size());
+    std::iota(order_.begin(), order_.end(), Index{0});
+    std::ranges::stable_sort(order_, {}, [&](Index t) { return groups_[t]; });
+  }
+
+  /// Returns the triangles of a group, with the vertices that these name.
+  TriangleMesh part(Index group) const {
+    const auto triangles = std::ranges::equal_range(order_, group, {}, [&](Index t) { return groups_[t]; });
+    std::vector<Index> vertices;
+    for (const Index t : triangles)
+      vertices.insert(vertices.end(), surface_.triangles[t].begin(), surface_.triangles[t].end());
+    std::ranges::sort(vertices);
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    TriangleMesh result;
+    for (const Index v : vertices) result.positions.push_back(surface_.positions[v]);
+    const auto number = [&](Index v) {
+      return static_cast<Index>(std::ranges::lower_bound(vertices, v) - vertices.begin());
+    };
+    for (const Index t : triangles) {
+      const auto& [a, b, c] = surface_.triangles[t];
+      result.triangles.push_back({number(a), number(b), number(c)});
+    }
+    return result;
+  }
+
+ private:
+  const TriangleMesh& surface_;
+  std::span<const Index> groups_;
+  std::vector<Index> order_;  ///< of the triangles, ascending by group
+};
+
+}  // namespace
+
 SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
   const MeshTopology topology(fitted);
   const Interfaces found = find_interfaces(fitted, topology);
@@ -142,16 +183,18 @@ SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
 }
 
 SurfaceDistance FitTarget::interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const {
+  // The samples of all pairs of regions together: with many pairs, each has fewer.
+  constexpr std::size_t kMostSamples = 500'000, kLeastSamples = 500;
   const Index num_groups = groups.empty() ? 0 : *std::ranges::max_element(groups);
+  const TrianglesByGroup of_fitted(fitted, groups), of_target(interfaces, group_of_interface_triangle);
+  SurfaceDistanceOptions options;
+  const std::size_t of_pair = std::max(kLeastSamples, kMostSamples / static_cast<std::size_t>(std::max(num_groups, 1)));
+  options.num_samples = std::min(options.num_samples, static_cast<int>(of_pair));
   SurfaceDistance largest;
   for (Index group = 1; group <= num_groups; ++group) {
-    TriangleMesh a{fitted.positions, {}}, b{interfaces.positions, {}};
-    for (std::size_t t = 0; t < groups.size(); ++t)
-      if (groups[t] == group) a.triangles.push_back(fitted.triangles[t]);
-    for (std::size_t t = 0; t < interfaces.triangles.size(); ++t)
-      if (group_of_interface_triangle[t] == group) b.triangles.push_back(interfaces.triangles[t]);
+    const TriangleMesh a = of_fitted.part(group), b = of_target.part(group);
     if (a.triangles.empty() || b.triangles.empty()) continue;
-    const SurfaceDistance distance = surface_distance(a, b);
+    const SurfaceDistance distance = surface_distance(a, b, options);
     largest.mean_a_to_b = std::max(largest.mean_a_to_b, distance.mean_a_to_b);
     largest.mean_b_to_a = std::max(largest.mean_b_to_a, distance.mean_b_to_a);
     if (distance.max_a_to_b.distance > largest.max_a_to_b.distance) largest.max_a_to_b = distance.max_a_to_b;

@@ -26,6 +26,12 @@ VolumeMesh cube() {
 
 }  // namespace
 
+TEST_CASE("A cell with a coordinate that is not finite is as poor as can be", "[quality]") {
+  VolumeMesh mesh = cube();
+  mesh.positions[6].y() = std::nan("");
+  CHECK(measure_corner_quality(mesh).cell_minima[0] == -1);
+}
+
 TEST_CASE("Ideal cells have corner scaled Jacobians of 1", "[quality]") {
   const double h = std::sqrt(3.0) / 2;
   const VolumeMesh prism =
