@@ -117,8 +117,7 @@ void ClosestPointEnergy::set_groups(std::vector<Index> of_triangle, std::span<co
   groups_ = std::move(of_triangle);
   sample_groups_.clear();
   for (const Index t : target_->sample_triangles()) sample_groups_.push_back(of_target[t]);
-  target_tree_ =
-      std::make_shared<const GroupedClosestPoint>(TriangleMesh{target_->positions(), target_->triangles()}, of_target);
+  target_tree_ = target_->tree(of_target);
   is_found_ = false;
   is_forgotten_ = true;
 }

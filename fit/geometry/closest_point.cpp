@@ -243,18 +243,12 @@ void ClosestPoint::visit(const Leaf& leaf, const Vec3& p, Index& best, double& b
     }
 }
 
-ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
+void ClosestPoint::search(const Vec3& p, Index& best, double& best_squared) const {
   struct Pending {
     double squared;
     Index child;
     bool is_leaf;
   };
-  Index best = kNoIndex;
-  double best_squared = kInfinity;
-  if (hint >= 0 && static_cast<std::size_t>(hint) < num_triangles()) {
-    best = hint;
-    best_squared = (p - closest_on_triangle(p, corners_[hint])).squaredNorm();
-  }
   Pending stack[128];  // at most seven more per level; 2^31 triangles make eleven levels
   int top = 0;
   stack[top++] = {0, 0, false};
@@ -287,11 +281,30 @@ ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
       stack[at] = {squared[c], node.child[c], node.is_leaf[c]};
     }
   }
+}
+
+ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
+  Index best = kNoIndex;
+  double best_squared = kInfinity;
+  if (hint >= 0 && static_cast<std::size_t>(hint) < num_triangles()) {
+    best = hint;
+    best_squared = (p - closest_on_triangle(p, corners_[hint])).squaredNorm();
+  }
+  search(p, best, best_squared);
   if (!(best_squared < kInfinity)) {
     if (!p.allFinite()) return {p, kNoIndex, std::numeric_limits<double>::quiet_NaN()};
     const Vec3& corner = corners_[order_.front()][0];
     return {corner, order_.front(), (p - corner).stableNorm()};
   }
+  const Vec3 point = closest_on_triangle(p, corners_[best]);
+  return {point, best, (p - point).norm()};
+}
+
+ClosestPoint::Hit ClosestPoint::closest_within(const Vec3& p, double distance) const {
+  Index best = kNoIndex;
+  double best_squared = distance * distance;
+  search(p, best, best_squared);
+  if (best == kNoIndex) return {p, kNoIndex, distance};
   const Vec3 point = closest_on_triangle(p, corners_[best]);
   return {point, best, (p - point).norm()};
 }

@@ -39,6 +39,10 @@ class ClosestPoint {
   ///       effect: of several triangles at the same distance, up to rounding, the returned one may depend on it.
   Hit closest(const Vec3& p, Index hint = kNoIndex) const;
 
+  /// Returns the closest point of the surface to p if it is nearer than a distance; else triangle kNoIndex, and that
+  /// distance. Much faster than `closest` if no part of the surface is that near.
+  Hit closest_within(const Vec3& p, double distance) const;
+
   /// Calls `closest` for many points, in parallel. Same bits for any number of threads. InputError: sizes differ.
   ///
   /// hits  in: their triangles are hints; for kNoIndex, the hint is the answer for the point before. out: the answers.
@@ -83,6 +87,8 @@ class ClosestPoint {
   static void partition(std::vector<Item>& items, Range range);
   Index add_node(Range range);
   void fit_boxes();
+  /// Replaces a triangle and the square of its distance by those of a nearer triangle, if there is one.
+  void search(const Vec3& p, Index& best, double& best_squared) const;
   void visit(const Leaf& leaf, const Vec3& p, Index& best, double& best_squared) const;
 
   std::vector<Node> nodes_;  // parents before their children

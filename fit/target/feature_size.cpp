@@ -20,8 +20,8 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
   double radius = most, cosine = 1;
   for (int round = 0; round < kMostRounds; ++round) {
     const Vec3 center = p + radius * n;
-    const ClosestPoint::Hit hit = tree.closest(center);
-    if (!(hit.distance < kTouching * radius)) break;
+    const ClosestPoint::Hit hit = tree.closest_within(center, kTouching * radius);
+    if (hit.triangle == kNoIndex) break;
     const Vec3 across = hit.point - p;
     const double height = across.dot(n), squared = across.squaredNorm();
     if (!(height > 0) || !(squared > 0)) break;  // only rounding puts a point of a smaller ball beside it

@@ -180,6 +180,14 @@ std::shared_ptr<const GroupedClosestPoint> TargetSurface::tree() const {
   return tree_;
 }
 
+std::shared_ptr<const GroupedClosestPoint> TargetSurface::tree(std::span<const Index> groups) const {
+  if (!tree_by_group_ || !std::ranges::equal(groups_of_tree_, groups)) {
+    tree_by_group_ = std::make_shared<const GroupedClosestPoint>(TriangleMesh{positions_, triangles_}, groups);
+    groups_of_tree_.assign(groups.begin(), groups.end());
+  }
+  return tree_by_group_;
+}
+
 void TargetSurface::resample(double spacing) {
   if (!(spacing >= 0) || !std::isfinite(spacing))
     throw InputError("TargetSurface: sample_spacing must be finite and >= 0");

@@ -97,6 +97,9 @@ class TargetSurface {
   /// Tree over the triangles, which all energies share; null for a cloud. Built by the first call, which must not run
   /// beside another one.
   std::shared_ptr<const internal::GroupedClosestPoint> tree() const;
+  /// Returns a tree over the triangles by group; the same one as long as it is asked for with the same groups. Not for
+  /// a cloud. Not to be called in parallel. groups  of each triangle, as for `GroupedClosestPoint`.
+  std::shared_ptr<const internal::GroupedClosestPoint> tree(std::span<const Index> groups) const;
   /// Samples the surface anew with another spacing. A cloud keeps its points. InputError: the spacing is negative, not
   /// finite, or far too small.
   void resample(double spacing);
@@ -112,7 +115,8 @@ class TargetSurface {
   void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
   void set_box(const Vec3& low, const Vec3& high);
 
-  mutable std::shared_ptr<const internal::GroupedClosestPoint> tree_;
+  mutable std::shared_ptr<const internal::GroupedClosestPoint> tree_, tree_by_group_;
+  mutable std::vector<Index> groups_of_tree_;  ///< of tree_by_group_
   std::vector<Vec3> positions_, normals_, samples_, sample_normals_;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<double> areas_, sample_areas_;

@@ -29,9 +29,15 @@ using namespace internal;
 
 namespace {
 
+/// Axes of a grid, and the bounding box of the surface in their coordinates.
+struct Frame {
+  Mat3 axes;
+  Eigen::AlignedBox3d box;
+};
+
 /// Orientation, cell size and offset of a grid.
 struct Placement {
-  Mat3 frame;
+  Frame frame;
   double size = 0;                   ///< edge length of a cell
   std::array<bool, 3> half_offset{}; ///< true: the grid is shifted by half a cell along this axis
 };
@@ -59,18 +65,17 @@ Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
 
 /// Returns the frames whose grids have at most `most` cells in all if about `cells` of them lie in the solid. The
 /// farther apart the solid's parts are, or the thinner its walls, the more of a grid is empty.
-std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, double most,
-                                        std::span<const Mat3> frames) {
-  const double size = kLeastSize * std::cbrt(solid.volume / static_cast<double>(cells));
-  std::vector<Mat3> result;
-  for (const Mat3& frame : frames)
-    if (cells_around(box_in(frame, solid.surface), size).prod() <= most) result.push_back(frame);
+std::vector<Frame> frames_of_small_grids(double volume, std::size_t cells, double most, std::span<const Frame> frames) {
+  const double size = kLeastSize * std::cbrt(volume / static_cast<double>(cells));
+  std::vector<Frame> result;
+  for (const Frame& frame : frames)
+    if (cells_around(frame.box, size).prod() <= most) result.push_back(frame);
   return result;
 }
 
-/// The grid around a surface; the placement must be such that its cells can be numbered.
-VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
-  const Eigen::AlignedBox3d box = box_in(placement.frame, surface);
+/// The grid around the surface; the placement must be such that its cells can be numbered.
+VoxelGrid placed_grid(const Placement& placement) {
+  const auto& [axes, box] = placement.frame;
   const Eigen::Array3d cells = cells_around(box, placement.size);
   VoxelGrid grid;
   Vec3 low = box.center();
@@ -79,8 +84,8 @@ VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
     grid.cells[axis] = static_cast<int>(cells[a]);
     low[a] -= placement.size * (grid.cells[axis] / 2.0 + (placement.half_offset[axis] ? 0.5 : 0.0));
   }
-  grid.edges = placement.size * placement.frame;
-  grid.origin = placement.frame * low;
+  grid.edges = placement.size * axes;
+  grid.origin = axes * low;
   return grid;
 }
 
@@ -110,12 +115,10 @@ std::size_t num_boundary_faces(const VoxelSolid& solid) {
 /// The search for templates with one number of cells.
 class Search {
  public:
-  Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Mat3> frames)
-      : solid_(solid),
-        options_(options),
-        cells_(static_cast<double>(cells)),
-        frames_(std::move(frames)),
-        stop_([this] { return !options_.progress || options_.progress(fraction_); }) {}
+  Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Frame> frames)
+      : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)), stop_([this] {
+          return !options_.progress || options_.progress(fraction_);
+        }) {}
 
   /// Tries grids through the planes of the surface with cells of several sizes; returns the best candidate, if any.
   /// result  receives the numbers of grids and of candidates, and whether the search was cancelled.
@@ -127,12 +130,12 @@ class Search {
 
  private:
   std::vector<Placement> placements() const;
-  double pillowed_size(const Mat3& frame) const;
+  double pillowed_size(const Frame& frame) const;
   double size_through(const AxisPlanes& planes) const;
   std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const {
     constexpr ShareRange kAccepted{kLeastCellShare, kMostCellShare};
     if (stop_.is_stopped()) return std::nullopt;
-    return best_in(placement.frame, placed_grid(solid_.surface, placement), kAccepted, num_right);
+    return best_in(placement.frame.axes, placed_grid(placement), kAccepted, num_right);
   }
   std::optional<Candidate> best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
                                    std::size_t& num_right) const;
@@ -143,19 +146,19 @@ class Search {
   const SolidBoundary& solid_;
   const AutoTemplateOptions& options_;
   double cells_;
-  std::vector<Mat3> frames_;
+  std::vector<Frame> frames_;
   double fraction_ = 0;      ///< progress that was told last
   mutable SearchStop stop_;
 };
 
 /// Cell size for which the inner cells of a grid and a layer around them add up to the requested count.
-double Search::pillowed_size(const Mat3& frame) const {
+double Search::pillowed_size(const Frame& frame) const {
   constexpr int kHalvings = 10, kLines = 3;
   const double plain = std::cbrt(solid_.volume / cells_);
   double low = plain, high = 4 * plain;
   for (int i = 0; i < kHalvings && !stop_.is_stopped(); ++i) {
     const double size = std::sqrt(low * high);
-    const VoxelGrid grid = placed_grid(solid_.surface, {frame, size, {}});
+    const VoxelGrid grid = placed_grid({frame, size, {}});
     const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines, &stop_);
     VoxelSolid solid(grid.cells, VertexRule::pillowable);
     for (std::size_t c = 0; c < fractions.size() && !stop_.is_stopped_at(c); ++c)
@@ -168,7 +171,7 @@ double Search::pillowed_size(const Mat3& frame) const {
 /// All combinations of size, frame and offset, the most promising first.
 std::vector<Placement> Search::placements() const {
   std::vector<double> sizes;
-  for (const Mat3& frame : frames_)
+  for (const Frame& frame : frames_)
     sizes.push_back(options_.pillow ? pillowed_size(frame) : std::cbrt(solid_.volume / cells_));
   std::vector<Placement> result;
   for (double factor : kSizes)
@@ -374,7 +377,8 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
                      std::to_string(kMostTemplateCells) + "], got " + std::to_string(options.cells));
   if (most < 1) throw InputError("auto_templates: at least one template must be asked for");
   const SolidBoundary solid = solid_boundary(surface);
-  const std::vector<Mat3> frames = template_frames(solid.surface);
+  std::vector<Frame> frames;
+  for (const Mat3& axes : template_frames(solid.surface)) frames.push_back({axes, box_in(axes, solid.surface)});
   constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, kMostTemplateGrowth};
   AutoTemplateResult result;
   result.wanted = solid.topology;
@@ -386,7 +390,7 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   }
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
-    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_cells, frames);
+    std::vector<Frame> usable = frames_of_small_grids(solid.volume, cells, most_cells, frames);
     const bool none_usable = usable.empty();
     Search search(solid, options, cells, std::move(usable));
     if (planes) {
