@@ -195,7 +195,7 @@ bool AutomaticFit::run_graded() {
   for (const Fault& fault : faults_of_best())
     for (const Index c : fault) places.push_back(cell_center(result_.mesh, result_.mesh.positions, c));
   SearchStop stop([this] { return !runner_.is_to_end(); });
-  std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
+  std::optional<SizedMesh> graded = graded_template(solid().surface, finest_->grid, finest_->kept,
                                                     target_.normalization.from_unit(std::move(places)), most, stop);
   if (stop.is_stopped()) {
     note_end_in("the grid with small cells");
@@ -324,11 +324,13 @@ AutomaticFitResult fit_automatically(const TriangleMesh& given, const AutomaticF
     return fit_regions(*regions, options);
   }
   const AutomaticFitOptions checked = checked_options(options);
-  const bool follows_sharp = has_edges_to_follow(target, checked.crease_angle_degrees, checked.follows_all_edges);
+  const EdgeDecision edges = decide_about_edges(target, checked.crease_angle_degrees, checked.follows_all_edges);
   const auto fit = [&](bool follows_borders, const AutomaticFitOptions& given) {
-    const EdgeChoice follows{follows_sharp, follows_borders};
-    if (!follows.any()) return AutomaticFit(target, follows, given).run();
-    return AutomaticFit(solid_boundary(target).surface, follows, given).run();
+    const EdgeChoice follows{edges.follows, follows_borders};
+    AutomaticFitResult result = follows.any() ? AutomaticFit(solid_boundary(target).surface, follows, given).run()
+                                              : AutomaticFit(target, follows, given).run();
+    if (!edges.warning.empty()) result.report.warnings.push_back(edges.warning);
+    return result;
   };
   const bool may_follow_borders = checked.crease_angle_degrees && !options.keeps_groups && !options.makes_cage &&
                                   has_smooth_borders(target, *checked.crease_angle_degrees);

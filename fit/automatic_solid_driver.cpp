@@ -41,15 +41,21 @@ void AutomaticSolidDriver::find_edges() {
 }
 
 void AutomaticSolidDriver::find_features() {
-  target_.sample(0);
+  constexpr std::size_t kMostSamples = 200'000;  // of large scans; a feature is larger than their spacing
+  target_.sample(0, kLeastTargetSamples, kMostSamples);
   const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
-  features_ =
-      feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2), most);
+  features_ = feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2),
+                            most, [this] { return runner_.is_to_end(); });
+}
+
+const SolidBoundary& AutomaticSolidDriver::solid() {
+  if (!solid_) solid_ = solid_boundary(original_);
+  return *solid_;
 }
 
 std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOptions options) {
   options.progress = begin_template();
-  AutoTemplateResult made = auto_templates(original_, options, 1);
+  AutoTemplateResult made = auto_templates(solid(), options, 1);
   result_.topology = made.wanted;
   if (!made.cancelled && made.templates.empty() && !diagnosis_)
     diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });

@@ -40,6 +40,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing
   /// as `make_template`.
   std::optional<AutoTemplate> make_template_of_at_most(std::size_t cells);
+  /// Returns the boundary of the target's solid, which is found once.
+  const SolidBoundary& solid();
   /// Brings a grid near the target and lays out the edges on it. Returns false if the fit must end.
   bool fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind);
   /// Routes the edges on the grid that was brought near the target.
@@ -75,6 +77,7 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// Returns the curves that the present mesh does not follow: all of them if it follows none.
   std::vector<UnfollowedCurve> unfollowed_curves() const;
 
+  std::optional<SolidBoundary> solid_;  ///< of original_, once it was needed
   FlatFacets facets_;         ///< of `target_.mesh`, if edges are followed
   LevelLayout level_layout_;  ///< of mesh_, from layout_
 };

@@ -97,7 +97,9 @@ class RegionFit : AutomaticDriver {
 };
 
 void RegionFit::find_curves() {
-  follows_edges_ = has_edges_to_follow(unit_.mesh, options_.crease_angle_degrees, options_.follows_all_edges);
+  const EdgeDecision edges = decide_about_edges(unit_.mesh, options_.crease_angle_degrees, options_.follows_all_edges);
+  follows_edges_ = edges.follows;
+  if (!edges.warning.empty()) result_.report.warnings.push_back(edges.warning);
   if (follows_edges_) curves_ = sheet_curves(unit_, options_.crease_angle_degrees);
 }
 

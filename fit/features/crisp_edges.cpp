@@ -2,6 +2,7 @@
 #include "subvol/fit/features/crisp_edges.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/format.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
@@ -183,10 +184,28 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   return result;
 }
 
-bool has_edges_to_follow(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges) {
-  if (!angle_degrees) return false;
+EdgeDecision decide_about_edges(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges) {
+  constexpr double kNotable = 0.3;  // relative length that is worth a warning
+  if (!angle_degrees) return {};
   const FeatureCurves curves = feature_curves(mesh, *angle_degrees);
-  return follows_all_edges ? !curves.empty() : edge_crispness(mesh, curves).is_designed();
+  if (follows_all_edges || curves.empty()) return {!curves.empty(), {}};
+  const EdgeCrispness crispness = edge_crispness(mesh, curves);
+  if (crispness.is_designed()) return {true, {}};
+  if (std::max(crispness.relative_length, crispness.relative_planar_length) < kNotable) return {};
+  double length = 0;
+  Eigen::AlignedBox3d box;
+  for (const auto& triangle : mesh.triangles)
+    for (const Index v : triangle) box.extend(mesh.positions[v]);
+  for (const FeatureCurve& curve : curves.curves) length += curve.length();
+  return {false,
+          formatted("the target is taken for a scan or a sculpture, because what is beside its sharp edges bends, "
+                    "too: %zu curves above %g degrees (%.3g %% of the diagonal in all) are not followed; they are "
+                    "if a crease angle is given (--crease-angle %g)",
+                    curves.curves.size(), *angle_degrees, 100 * length / box.diagonal().norm(), *angle_degrees)};
+}
+
+bool has_edges_to_follow(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges) {
+  return decide_about_edges(mesh, angle_degrees, follows_all_edges).follows;
 }
 
 }  // namespace subvol::internal

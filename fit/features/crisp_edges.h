@@ -5,6 +5,7 @@
 #include "subvol/surface/triangle_mesh.h"
 
 #include <optional>
+#include <string>
 
 namespace subvol::internal {
 
@@ -24,22 +25,30 @@ struct EdgeCrispness {
 
   /// True for parts as they are designed, whose edges must stay. The bends of scans and sculptures exceed any angle in
   /// places, but their surroundings bend nearly as much, and are not planar; parts with many rounded edges have much
-  /// longer crisp ones. Of 184 surfaces, the scans have a crisp share of less than 0.5, a relative length of less than
-  /// 1, or at most 0.95 in the sum below, but for two coarse meshes of animals, and a planar share of at most 0.26. The
-  /// parts have at least 0.51, 2.0 and 1.07, or a planar share of at least 0.98.
+  /// longer crisp ones, and edges at planes. Of 280 surfaces, the scans have a crisp share of less than 0.5, a relative
+  /// length of less than 1, or at most 0.95 in the first sum, but for two coarse meshes of animals, and at most 1.24 in
+  /// the second one. The parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
-    constexpr double kLong = 15;
-    const bool is_crisp = crisp_share >= 0.5 && relative_length >= 1 && crisp_share + relative_length / kLong >= 1;
-    return is_crisp || (planar_share >= 0.6 && relative_planar_length >= 1);
+    constexpr double kLong = 15, kOfPlanes = 2;
+    constexpr double kLeastLength = 0.3;  // more than the rim of a hole that was covered in a scan
+    const double crisp = crisp_share + relative_length / kLong;
+    return (crisp_share >= 0.5 && relative_length >= 1 && crisp >= 1) ||
+           (relative_planar_length >= kLeastLength && crisp + kOfPlanes * planar_share >= 1.4);
   }
 };
 
 /// mesh, curves  as for and from `feature_curves`. Cost: one sort of the edges and one of the triangles.
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves);
 
-/// Returns true if a fit follows the sharp edges of a surface: there are some, and they are a designed part's or all are
-/// to be followed.
+/// What a fit does about the sharp edges of a surface.
+struct EdgeDecision {
+  bool follows = false;  ///< there are some, and they are a designed part's or all are to be followed
+  std::string warning;   ///< if edges are left out that stand out: what they are, and how they are followed; else empty
+};
+
 /// angle_degrees  as for `feature_curves`; nothing: no edge is sharp.
+EdgeDecision decide_about_edges(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges);
+/// As above, without the warning.
 bool has_edges_to_follow(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges);
 
 }  // namespace subvol::internal

@@ -33,17 +33,22 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
 
 }  // namespace
 
-FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most) {
+FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most,
+                           const std::function<bool()>& cancelled) {
+  constexpr std::size_t kBetweenQuestions = 4096;
   if (!(least >= 0) || !(most > least) || !std::isfinite(most))
     throw InputError("feature sizes: the largest radius must be finite and above the smallest, which must be >= 0");
   FeatureSizes features;
   if (surface.is_cloud()) return features;
   const std::vector<Vec3>&samples = surface.samples(), &normals = surface.sample_normals();
-  std::vector<double> sizes(samples.size());
+  std::vector<double> sizes(samples.size(), most);
+  for (std::size_t first = 0; first < samples.size(); first += kBetweenQuestions) {
+    if (cancelled && cancelled()) break;
 #pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    sizes[i] =
-        std::min(ball_radius(samples[i], normals[i], tree, most), ball_radius(samples[i], -normals[i], tree, most));
+    for (std::size_t i = first; i < std::min(first + kBetweenQuestions, samples.size()); ++i)
+      sizes[i] =
+          std::min(ball_radius(samples[i], normals[i], tree, most), ball_radius(samples[i], -normals[i], tree, most));
+  }
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (sizes[i] < least || sizes[i] >= most) continue;
     features.points.push_back(samples[i]);

@@ -3,6 +3,7 @@
 
 #include "subvol/fit/target/target_surface.h"
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -32,9 +33,11 @@ struct FeatureSizes {
 /// tree     of the same surface.
 /// least    smallest radius that is of interest, >= 0: crossings and slivers of a triangulation look like tiny slots.
 /// most     largest one, > least. InputError: another range.
+/// cancelled  asked every few thousand samples; may be empty. If it returns true, the samples so far count.
 /// returns  the samples with a radius in that range, in their order. Empty if there is none.
 /// Parallel; same bits for any number of threads. Cost: some six closest points for each sample and side.
-FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most);
+FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most,
+                           const std::function<bool()>& cancelled = {});
 
 /// The place where a fitted surface misses a feature by the largest share of its size.
 struct FeatureMiss {

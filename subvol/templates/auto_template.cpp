@@ -372,11 +372,14 @@ AutoTemplate finished(const Candidate& candidate, const AutoTemplateOptions& opt
 }  // namespace
 
 AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options, std::size_t most) {
+  return auto_templates(solid_boundary(surface), options, most);
+}
+
+AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t most) {
   if (options.cells < kLeastTemplateCells || options.cells > kMostTemplateCells)
     throw InputError("the number of cells must be in [" + std::to_string(kLeastTemplateCells) + ", " +
                      std::to_string(kMostTemplateCells) + "], got " + std::to_string(options.cells));
   if (most < 1) throw InputError("auto_templates: at least one template must be asked for");
-  const SolidBoundary solid = solid_boundary(surface);
   std::vector<Frame> frames;
   for (const Mat3& axes : template_frames(solid.surface)) frames.push_back({axes, box_in(axes, solid.surface)});
   constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, kMostTemplateGrowth};

@@ -79,5 +79,8 @@ struct AutoTemplateResult {
 /// numbers of cells and triangles.
 AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {},
                                   std::size_t most = 1);
+/// As above, for a solid of which the boundary is known, if several templates are made for it.
+AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplateOptions& options = {},
+                                  std::size_t most = 1);
 
 }  // namespace subvol

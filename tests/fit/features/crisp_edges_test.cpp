@@ -55,6 +55,7 @@ TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
   const TriangleMesh stone = rough_block(0.3);
   CHECK(has_edges_to_follow(stone, 40, true));
   CHECK_FALSE(has_edges_to_follow(stone, 40, false));
+  CHECK(decide_about_edges(cube, 40, false).warning.empty());
   CHECK(edge_crispness(cube, feature_curves(cube, 40)).crisp_share == Approx(1));
 }
 
