@@ -178,6 +178,7 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
 }
 
 void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options) {
+  constexpr double kNotablyLower = 0.8;  // share of the quality
   FitReport& report = result.report;
   const AutomaticFitTrial& chosen = result.trials[result.chosen];
   const std::string found = formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%",
@@ -189,11 +190,23 @@ void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options
         formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ", options.quality,
                   options.mean_tolerance_percent, options.max_tolerance_percent) +
         found);
+  else if (chosen.least_scaled_jacobian < kNotablyLower * options.quality)
+    report.warnings.push_back(
+        formatted("the least scaled Jacobian, %.3f, is below the quality of %.2f that was asked for: cells at sharp "
+                  "edges cannot be better than the angle there allows, and less is asked of them",
+                  chosen.least_scaled_jacobian, options.quality));
+  if (const std::optional<CreaseDistance>& edges = report.creases;
+      edges && edges->num_followed > 0 && edges->max_percent() > options.max_tolerance_percent)
+    report.warnings.push_back(
+        formatted("creases are up to %.3g %% of the diagonal away from the sharp edges that they follow, the farthest at "
+                  "(%.6g, %.6g, %.6g); %.3g %% of the length of all edges is within %g %%",
+                  edges->max_percent(), edges->farthest.x(), edges->farthest.y(), edges->farthest.z(),
+                  100 * edges->within_share(), kSharpPercent));
   if (chosen.feature_miss && chosen.feature_miss->share > kAutomaticFeatureShare) {
     const FeatureMiss& miss = *chosen.feature_miss;
     report.warnings.push_back(
-        formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
-                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
+        formatted("a narrow place of radius %.4g (a hole, pin, wall or slot, or the tip of a wedge) is missed by %.4g, "
+                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells come nearer",
                   miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
   warn_of_missed_edges(result.missed_edges, chosen.curves, "sharp edges", report);

@@ -284,7 +284,7 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
   const bool can_be_subdivided = check.num_cells_of_kind[static_cast<std::size_t>(CellKind::pyramid)] == 0;
-  if (can_be_subdivided &&
+  if (options.audits_subdivision && can_be_subdivided &&
       !has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
     check.subdivision_audit = audit(mesh);
   if (RegionReport regions = measure_regions(mesh, &*check.quality); regions.regions.size() > 1)

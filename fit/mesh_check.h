@@ -32,6 +32,7 @@ struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< for the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< as in `SurfaceDistanceOptions`
+  bool audits_subdivision = true;  ///< tell what would degrade a subdivision of the mesh
   CellLabels labels{};  ///< of curved cells, whose mesh does not hold them; empty: one region
   /// Called before each part with its name: "quality", "topology", "self-intersections" and, if there are a target and
   /// a boundary, "distance". Also called repeatedly during the search for self-intersections.

@@ -242,10 +242,17 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
   return text.str();
 }
 
-FillingForecast forecast_filling(const std::filesystem::path& path) {
-  std::vector<std::string> told_before;
+FillingForecast forecast_filling(const std::filesystem::path& path, const std::vector<std::string>& told) {
+  std::vector<std::string> warnings;
   try {
-    return {load_to_fill(path, {}, told_before), ""};
+    FillingForecast forecast{load_to_fill(path, {}, warnings), ""};
+    const std::string file = path.string() + ": ";
+    for (std::string& warning : warnings) {
+      if (std::ranges::find(told, warning) != told.end()) continue;
+      if (warning.starts_with(file)) warning.erase(0, file.size());
+      forecast.repair.done.insert(forecast.repair.done.begin(), std::move(warning));
+    }
+    return forecast;
   } catch (const InputError& e) {
     return {{}, e.what()};
   }

@@ -56,7 +56,8 @@ struct FillingForecast {
 };
 
 /// Tries what `load_to_fill` does without options. An interrupt ends it.
-FillingForecast forecast_filling(const std::filesystem::path& path);
+/// told  warnings of the file that were told before; others become repairs of the forecast.
+FillingForecast forecast_filling(const std::filesystem::path& path, const std::vector<std::string>& told);
 
 /// Return the forecast as text, a line for each repair, and as an entry of a report.
 std::string to_text(const FillingForecast& forecast);

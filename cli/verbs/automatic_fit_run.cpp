@@ -122,7 +122,9 @@ void AutomaticFitRun::write() {
 void AutomaticFitRun::check() {
   const std::optional<VolumeMesh> written = written_cells(outputs_);
   const VolumeMesh& mesh = written ? *written : result_.mesh;
-  mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface(), {.progress = progress}); });
+  mesh_check_ = watched([&](auto progress) {
+    return check_mesh(mesh, &surface(), {.audits_subdivision = has_cage(), .progress = progress});
+  });
   if (has_cage()) {
     measure_limit(result_.cage, surface(), arguments_.writing);
     hold_to(arguments_.mean_tolerance_percent, "the limit surface's mean",

@@ -132,7 +132,7 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
       text = to_text(*regions) + to_text(diagnosis);
     }
   if (!diagnosis.is_cancelled && !diagnosis.is_fillable()) {
-    const FillingForecast forecast = forecast_filling(arguments.mesh);
+    const FillingForecast forecast = forecast_filling(arguments.mesh, warnings);
     if (!interrupted()) {
       json["filling"] = filling_json(forecast);
       text += to_text(forecast);

@@ -22,7 +22,8 @@ struct CreaseDistance {
 
   double mean_percent() const { return std::max(mean_from_target_percent, mean_to_target_percent); }
   double max_percent() const { return std::max(max_from_target_percent, max_to_target_percent); }
-  double followed_share() const { return share(followed_length_percent); }
+  /// At most 1: a curve whose end shares a vertex with a corner nearby is followed a little beyond its end.
+  double followed_share() const { return std::min(1.0, share(followed_length_percent)); }
   double within_share() const { return share(within_length_percent); }
 
  private:

@@ -165,7 +165,8 @@ class Router {
         reasons_[c] = NotFollowed::excluded;
       else if (features_.angles[c] < kLeastAngle)
         reasons_[c] = NotFollowed::too_acute;
-      else if (curves_[c].length() < kLeastRoutedLength * edge_lengths_near(graph_, curves_[c]).mean)
+      else if (curves_[c].length() < kLeastRoutedLength * edge_lengths_near(graph_, curves_[c]).mean &&
+               !has_edge_on(graph_, curves_[c]))
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }

@@ -95,4 +95,15 @@ RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCu
   return {h * sizes.mean, h * sizes.largest};
 }
 
+bool has_edge_on(const RoutingGraph& graph, const FeatureCurve& curve) {
+  constexpr double kNear = 0.05;  // share of the length
+  if (graph.edges().empty()) return false;
+  const double length = curve.length(), most = kNear * length;
+  const Vec3 &front = curve.points.front(), &back = curve.points.back();
+  const Index v = graph.nearest_vertex(front), w = graph.nearest_vertex(back);
+  if ((graph.position(v) - front).norm() > most || (graph.position(w) - back).norm() > most) return false;
+  if ((front - back).norm() < length - most) return false;  // it is bent
+  return std::ranges::any_of(graph.edges_at(v), [&](Index edge) { return graph.other_end(edge, v) == w; });
+}
+
 }  // namespace subvol::internal

@@ -66,6 +66,10 @@ class RoutingGraph {
 /// there.
 RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve);
 
+/// Returns true if an edge of the mesh lies on a curve of its length, as in grids with flat cells whose lines pass
+/// through the faces of a plate.
+bool has_edge_on(const RoutingGraph& graph, const FeatureCurve& curve);
+
 /// The vertices and edges that paths may not touch, and what those cost that they may.
 struct Occupied {
   std::vector<std::uint8_t> vertices, edges;

@@ -39,15 +39,36 @@ struct Samples {
   struct Edge {
     Index place;
     int corner;  ///< the edge leads from this corner to the next one
+    int points;  ///< in its inside, evenly spread
   };
   std::vector<int> cuts;  ///< m of each triangle; 0 if only its corners are sampled
   std::vector<Vertex> vertices;
-  std::vector<Edge> edges;  ///< whose midpoints are sampled
+  std::vector<Edge> edges;  ///< that are sampled
   double area = 0;          ///< of all triangles
 };
 
+/// Returns the number of points at which an edge is sampled: where a surface is sharp or ends, a fitted one is
+/// farthest. at_edge  the sides of triangles there.  spacing  of the samples.
+template <class Keyed>
+int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::span<const Keyed> at_edge,
+                   double spacing) {
+  constexpr double kSmoothCosine = 0.985;  // of 10 degrees
+  constexpr double kMost = 1000;
+  const auto normal = [&](const Keyed& side) -> Vec3 {
+    const auto& [a, b, c] = mesh.triangles[order[side.edge.place]];
+    return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
+  };
+  if (at_edge.size() == 2 && std::abs(normal(at_edge[0]).dot(normal(at_edge[1]))) > kSmoothCosine) return 1;
+  const auto& corners = mesh.triangles[order[at_edge[0].edge.place]];
+  const int k = at_edge[0].edge.corner;
+  const double length = (mesh.positions[corners[(k + 1) % 3]] - mesh.positions[corners[k]]).norm();
+  return spacing > 0 ? static_cast<int>(std::clamp(std::round(length / spacing) - 1, 1.0, kMost)) : 1;
+}
+
 /// Returns the edges of the triangles that are cut, each once, in ascending order of their places.
-std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const Index> order, std::span<const int> cuts) {
+/// spacing  of the samples.
+std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const Index> order, std::span<const int> cuts,
+                                    double spacing) {
   struct Keyed {
     std::uint64_t key;
     Samples::Edge edge;
@@ -58,16 +79,20 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
     for (int k = 0; k < 3; ++k) {
       const auto& corners = mesh.triangles[order[place]];
       const auto [low, high] = std::minmax(corners[k], corners[(k + 1) % 3]);
-      all.push_back(
-          {static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high), {static_cast<Index>(place), k}});
+      all.push_back({static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint32_t>(high),
+                     {static_cast<Index>(place), k, 1}});
     }
   }
   const auto at = [](const Samples::Edge& edge) { return std::pair(edge.place, edge.corner); };
   std::sort(all.begin(), all.end(),
             [&](const Keyed& a, const Keyed& b) { return a.key != b.key ? a.key < b.key : at(a.edge) < at(b.edge); });
   std::vector<Samples::Edge> edges;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (i == 0 || all[i].key != all[i - 1].key) edges.push_back(all[i].edge);
+  for (std::size_t first = 0, last; first < all.size(); first = last) {
+    for (last = first + 1; last < all.size() && all[last].key == all[first].key;) ++last;
+    edges.push_back(all[first].edge);
+    edges.back().points =
+        points_of_edge(mesh, order, std::span<const Keyed>(all).subspan(first, last - first), spacing);
+  }
   std::sort(edges.begin(), edges.end(), [&](const Samples::Edge& a, const Samples::Edge& b) { return at(a) < at(b); });
   return edges;
 }
@@ -94,7 +119,8 @@ Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const
     for (const Index v : mesh.triangles[t])
       if (!std::exchange(seen[v], 1) && (options.extremes || of_vertex[v] > 0))
         samples.vertices.push_back({v, of_vertex[v]});
-  if (options.extremes) samples.edges = edges_of(mesh, order, samples.cuts);
+  if (options.extremes)
+    samples.edges = edges_of(mesh, order, samples.cuts, std::sqrt(samples.area / options.num_samples));
   return samples;
 }
 
@@ -175,9 +201,10 @@ OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const
   sample(
       samples.edges.size(), to,
       [&](Sampler& sampler, std::size_t i) {
-        const auto& [place, corner] = samples.edges[i];
+        const auto& [place, corner, points] = samples.edges[i];
         const std::array<Vec3, 3> x = corners(place);
-        sampler.distance(0.5 * (x[corner] + x[(corner + 1) % 3]));
+        const Vec3 &begin = x[corner], &end = x[(corner + 1) % 3];
+        for (int k = 1; k <= points; ++k) sampler.distance(begin + k / (points + 1.0) * (end - begin));
       },
       result);
   result.mean = samples.area > 0 ? result.mean / samples.area : 0;

@@ -13,7 +13,8 @@ class ClosestPoint;
 
 struct SurfaceDistanceOptions {
   int num_samples = 50000;  ///< approximate number of points of each mean, spread by area; >= 1
-  /// Vertices and edge midpoints also count for the maxima. Without them, measuring takes about two thirds of the time.
+  /// Vertices and points on edges also count for the maxima. Without them, measuring takes about two thirds of the
+  /// time.
   bool extremes = true;
 };
 
@@ -42,11 +43,11 @@ struct SurfaceDistance {
 ///   mean_a_to_b = 1/A integral over a of dist(x, b),   max_a_to_b = max over a of dist(x, b)
 ///
 /// Every triangle is cut into m^2 equal ones, m = sqrt(num_samples * its share of the area) rounded, at least 1; their
-/// centroids have equal weights in its part of the mean. Vertices and edge midpoints also count for the maximum, once
-/// each (`extremes`). If there are more than four times as many triangles as num_samples, those of less than an eighth
-/// of a sample's area are sampled at their corners only, each of which has the weight of a third of the area. The
-/// maximum is a lower bound of the true one; it is off by less than the distance between samples. Triangles without
-/// area have no weight.
+/// centroids have equal weights in its part of the mean. Vertices and midpoints of edges also count for the maximum,
+/// once each (`extremes`), and on edges of more than 10 degrees or of one triangle as many points as their length asks
+/// for. If there are more than four times as many triangles as num_samples, those of less than an eighth of a sample's
+/// area are sampled at their corners only, each of which has the weight of a third of the area. The maximum is a lower
+/// bound of the true one; it is off by less than the distance between samples. Triangles without area have no weight.
 ///
 /// InputError: as `ClosestPoint` for either surface; num_samples < 1. Deterministic and parallel, with the same bits
 /// for any number of threads. Cost: about 0.4 us a sample on one core, plus both trees.

@@ -9,6 +9,7 @@
 #include "subvol/fit/mending/part_union.h"
 #include "subvol/fit/mending/second_sides.h"
 #include "subvol/fit/mending/solid_wrap.h"
+#include "subvol/fit/mending/tidy_surface.h"
 #include "subvol/fit/target/carried_groups.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/surface_parts.h"
@@ -229,6 +230,11 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
           formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
       return repair;
     }
+  if (std::optional<TidySurface> tidy = tidy_surface(given, diagnosis)) {
+    SurfaceRepair repair = repair_surface(tidy->surface, cancelled, rule);
+    repair.done.insert(repair.done.begin(), tidy->done.begin(), tidy->done.end());
+    return repair;
+  }
   RepairAttempt attempt = attempt_repair(given, diagnosis, cancelled, rule);
   if (attempt.is_successful()) return std::move(*attempt.repair);
   if (cancelled && cancelled()) return {.surface = given};

@@ -28,6 +28,9 @@ struct SurfaceRepair {
 ///
 /// The second sides of a two-sided surface are dropped (`without_second_sides`), unless RegionRule::keep is given.
 ///
+/// First, repeated triangles are dropped, triangles that disagree with their part are turned, and triangles are cut
+/// where vertices of others lie on their open edges (`tidy_surface`).
+///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
 /// points inward beside others that do not. A solid part in a void stays a part of its own.

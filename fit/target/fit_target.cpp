@@ -146,7 +146,9 @@ class TrianglesByGroup {
 
   /// Returns the triangles of a group, with the vertices that these name.
   TriangleMesh part(Index group) const {
-    const auto triangles = std::ranges::equal_range(order_, group, {}, [&](Index t) { return groups_[t]; });
+    const auto of = [&](Index t) { return groups_[t]; };
+    const std::span<const Index> triangles(std::ranges::lower_bound(order_, group, {}, of),
+                                           std::ranges::upper_bound(order_, group, {}, of));
     std::vector<Index> vertices;
     for (const Index t : triangles)
       vertices.insert(vertices.end(), surface_.triangles[t].begin(), surface_.triangles[t].end());
