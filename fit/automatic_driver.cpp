@@ -135,8 +135,10 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
   record.cells = mesh_.num_cells();
+  const std::size_t first = result_.report.stages.size();
   const bool going = (!is_relaxing_ || relax_hopeless_cells(stages, record)) &&
                      stages.run(schedule, runner_, record, unknowns(), result_.report);
+  for (std::size_t i = first; i < result_.report.stages.size(); ++i) stages_.push_back(i);
   follow_cage();
   state_ = stages.state();
   return going;
@@ -251,6 +253,7 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
   if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
   result_.cage = cage_ ? cage_->cage : VolumeMesh();
   result_.states = states_;
+  stages_of_best_ = stages_;
   result_.missed_edges = std::move(missed);
   return true;
 }
@@ -269,6 +272,10 @@ AutomaticFitResult AutomaticDriver::finish(bool going) {
         "details of the target are narrower than the mesh's cells: the mesh met itself or had poor cells there; it was "
         "relaxed and follows the target less closely, first at " +
         to_text(*best().relaxed_at) + "; more cells may hold the details");
+  if (!result_.trials.empty()) {
+    result_.report.undo_stages(0, result_.report.stages.size());
+    for (const std::size_t i : stages_of_best_) result_.report.stages[i].kept = true;
+  }
   const Normalization& normalization = target_.normalization;
   result_.mesh.positions = normalization.from_unit(std::move(result_.mesh.positions));
   result_.cage.positions = normalization.from_unit(std::move(result_.cage.positions));

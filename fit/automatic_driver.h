@@ -54,11 +54,17 @@ class AutomaticDriver {
 
   /// Returns true if the present mesh is that of the best trial.
   bool is_present_best() const { return taken_best_ == result_.chosen || result_.chosen + 1 == result_.trials.size(); }
-  /// To be called if the present mesh was made that of the best trial: takes its states as well.
+  /// To be called if the present mesh was made that of the best trial: takes its states and stages as well.
   void take_states() {
     states_ = result_.states;
+    stages_ = stages_of_best_;
     taken_best_ = result_.chosen;
   }
+  /// To be called if the present mesh is a new one.  stages  that led to it, by their numbers in the report.
+  void begin_mesh(std::vector<std::size_t> stages = {}) { stages_ = std::move(stages); }
+  /// Returns the stages that led to the present mesh, and to that of the best trial.
+  const std::vector<std::size_t>& stages() const { return stages_; }
+  const std::vector<std::size_t>& stages_of_best() const { return stages_of_best_; }
 
   /// Begins an attempt that takes this portion of the work that is left.
   void begin_attempt(double portion = kAttemptPortion) {
@@ -141,6 +147,7 @@ class AutomaticDriver {
   bool is_relaxing_ = false;        ///< `relax_hopeless_cells` precedes the stages
   std::optional<Vec3> relaxed_at_;  ///< its first place, in the target's coordinates
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept
+  std::vector<std::size_t> stages_, stages_of_best_;  ///< that led to the present mesh, to that of the best trial
   std::optional<std::size_t> taken_best_;     ///< number of the trial at `take_states`
   std::optional<std::size_t> last_polished_;  ///< number of the trial that was polished, or is the result of that
   double share_at_end_ = 0;       ///< of the attempt in progress

@@ -102,6 +102,7 @@ bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
   const bool is_fine = !options_.makes_cage && cells > cells_after(attempt.template_cells, attempt.levels);
   const int levels = is_fine ? 0 : attempt.levels;
   mesh_ = made->mesh;
+  begin_mesh();
   sizes_.clear();
   start_ = {};
   if (levels == 0) finest_ = std::move(made);
@@ -206,6 +207,7 @@ bool AutomaticFit::run_graded() {
   layout_.reset();
   cage_.reset();
   mesh_ = std::move(graded->mesh);
+  begin_mesh();
   sizes_ = graded->sizes;
   start_ = {.grid = {{}, std::move(graded->sizes)}};
   AutomaticFitTrial trial{.template_cells = finest_->mesh.num_cells(), .refined_cells = mesh_.num_cells()};
@@ -241,6 +243,7 @@ bool AutomaticFit::run_refined() {
   }
   layout_.reset();
   mesh_ = std::move(refined->mesh);
+  begin_mesh(stages_of_best());
   sizes_ = refined->sizes;
   start_ = {.grid = {{}, std::move(refined->sizes)}};
   return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&

@@ -215,10 +215,12 @@ bool AutomaticSolidDriver::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind k
   layout_.reset();
   cage_.reset();
   mesh_ = grid.mesh;
+  begin_mesh();
   sizes_ = grid.sizes;
   start_ = {.kind = kind, .grid = std::move(grid)};
   if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) return false;
   start_.fitted = mesh_.positions;
+  start_.stages = stages();
   lay_out({});
   return true;
 }
@@ -229,6 +231,7 @@ void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
   layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
   cage_.reset();
   mesh_ = layout_->tagged_mesh;
+  begin_mesh(start_.stages);
   level_layout_ = {layout_->group_of_face, layout_->caps, layout_->creases};
   sizes_ = padded_sizes(mesh_, start_.grid.sizes);
 }

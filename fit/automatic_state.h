@@ -8,6 +8,7 @@
 #include "subvol/fit/fits/local_cells.h"
 #include "subvol/surface/triangle_mesh.h"
 
+#include <cstddef>
 #include <vector>
 
 namespace subvol::internal {
@@ -24,6 +25,7 @@ struct TrialStart {
   SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
   std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
   std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
+  std::vector<std::size_t> stages;      ///< that brought the grid near the target, by their numbers in the report
   std::vector<std::vector<Vec3>> lost;  ///< curves without a path, and ends of curves that paths leave out
 };
 

@@ -91,8 +91,9 @@ Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) 
   const auto tree = std::make_shared<const ClosestPoint>(*target);
   return [target, tree, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
-    check.distance = surface_distance(boundary, ClosestPoint(boundary), *target, *tree, {.num_samples = samples});
-    check.normals = normal_deviation(boundary, *target, *tree, samples);
+    const ClosestPoint boundary_tree(boundary);
+    check.distance = surface_distance(boundary, boundary_tree, *target, *tree, {.num_samples = samples});
+    check.normals = normal_deviation(boundary, boundary_tree, *target, *tree, samples);
   };
 }
 
@@ -287,8 +288,8 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   if (options.audits_subdivision && can_be_subdivided &&
       !has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
     check.subdivision_audit = audit(mesh);
-  if (RegionReport regions = measure_regions(mesh, &*check.quality); regions.regions.size() > 1)
-    check.regions = std::move(regions);
+  if (std::ranges::adjacent_find(mesh.references, std::not_equal_to{}) != mesh.references.end())
+    check.regions = measure_regions(mesh, &*check.quality);
   if (has_any(check.defects, {Kind::not_finite})) return check;
   std::vector<Index> face_of_triangle;
   const PolygonMesh boundary = boundary_surface(mesh, topology);

@@ -277,6 +277,7 @@ bool RegionFit::make_pillowed(std::size_t most) {
     const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
     if (!grid) return false;
     mesh_ = pillow_regions(*grid, pillow_choice(*grid));
+    begin_mesh();
     const std::size_t got = mesh_.num_cells();
     if (got <= most || round == kGridTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
     asked *= kRetryShare * static_cast<double>(most) / static_cast<double>(got);
@@ -310,6 +311,7 @@ bool RegionFit::run_curves(std::size_t cells) {
     const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
     if (!grid) return !no_template_.empty();
     mesh_ = *grid;
+    begin_mesh();
     layout_.reset();
     if (!is_exact(*grid) && !fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
       if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});

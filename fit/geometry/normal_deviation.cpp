@@ -45,9 +45,8 @@ double degrees_between(const Vec3& a, const Vec3& b) {
 
 }  // namespace
 
-NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh& target,
-                                 const ClosestPoint& target_tree, int num_samples) {
-  const ClosestPoint order(fitted);  // neighbors in its order are neighbors in space
+NormalDeviation normal_deviation(const TriangleMesh& fitted, const ClosestPoint& fitted_tree,
+                                 const TriangleMesh& target, const ClosestPoint& target_tree, int num_samples) {
   double total = 0;
   for (std::size_t t = 0; t < fitted.triangles.size(); ++t)
     total += doubled_area_vector(fitted, fitted.triangles[t]).norm();
@@ -57,7 +56,7 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh&
   for (std::size_t run = 0; run < runs.size(); ++run) {
     Index hint = kNoIndex;
     for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, fitted.triangles.size()); ++place) {
-      const auto t = static_cast<std::size_t>(order.order()[place]);
+      const auto t = static_cast<std::size_t>(fitted_tree.order()[place]);  // neighbors in space
       const Vec3 vector = doubled_area_vector(fitted, fitted.triangles[t]);
       const double share = total > 0 ? vector.norm() / total : 0;
       if (!(share > 0)) continue;

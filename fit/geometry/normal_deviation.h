@@ -19,10 +19,10 @@ struct NormalDeviation {
 /// their centroids are the points. At sharp edges, the closest point may be on the other side: a fit that is otherwise
 /// exact has a deviation there.
 ///
-/// target_tree  of `target`.  num_samples  approximate number of points, >= 1.
+/// fitted_tree, target_tree  of the surfaces.  num_samples  approximate number of points, >= 1.
 /// InputError: as `ClosestPoint` for either surface. Triangles without area do not count; if all are so: zeros.
 /// Parallel; same bits for any number of threads.
-NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh& target,
-                                 const ClosestPoint& target_tree, int num_samples);
+NormalDeviation normal_deviation(const TriangleMesh& fitted, const ClosestPoint& fitted_tree,
+                                 const TriangleMesh& target, const ClosestPoint& target_tree, int num_samples);
 
 }  // namespace subvol

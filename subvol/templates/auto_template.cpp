@@ -302,17 +302,21 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
 
 bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
                  double fraction_share) {
-  constexpr std::size_t kBatch = 16;    // grids between two calls of the progress callback
-  constexpr std::size_t kEnough = 200;  // valid candidates after which a better one hardly ever turns up
+  constexpr std::size_t kMostBatch = 16, kLeastBatch = 4;  // grids between two calls of the progress callback
+  constexpr double kEnough = 200;    // valid candidates after which a better one hardly ever turns up
+  constexpr double kUsual = 10'000;  // cells; of larger grids, which differ less, fewer are tried in proportion
+  const double share = std::min(1.0, kUsual / cells_);
+  const double enough = share * kEnough;
+  const auto batch = std::max(kLeastBatch, static_cast<std::size_t>(share * kMostBatch));
   const std::vector<Placement> all = placements();
   std::size_t right = 0;
-  for (std::size_t first = 0; first < all.size() && right < kEnough; first += kBatch) {
+  for (std::size_t first = 0; first < all.size() && static_cast<double>(right) < enough; first += batch) {
     const auto fraction = static_cast<double>(first) / static_cast<double>(all.size());
     fraction_ = fraction_before + fraction_share * fraction;
     if (options_.progress && !options_.progress(fraction_)) return false;
-    const std::size_t count = std::min(kBatch, all.size() - first);
-    std::array<std::optional<Candidate>, kBatch> found;
-    std::array<std::size_t, kBatch> num_right{};
+    const std::size_t count = std::min(batch, all.size() - first);
+    std::array<std::optional<Candidate>, kMostBatch> found;
+    std::array<std::size_t, kMostBatch> num_right{};
     ParallelErrors errors;
     std::atomic<int> left = static_cast<int>(count);
 #pragma omp parallel

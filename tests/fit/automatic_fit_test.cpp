@@ -36,6 +36,16 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
   CHECK(result.trials[result.chosen].cells == result.mesh.num_cells());
 }
 
+TEST_CASE("Stages that led to the chosen trial are kept in the report, others are not") {
+  AutomaticFitOptions options{.cells = 400, .quality = kMostQuality};  // out of reach: several trials
+  AutomaticFitResult result = fit_automatically(test::tetrahedron_surface(), options);
+  REQUIRE(result.trials.size() > 1);
+  const std::vector<StageRecord>& stages = result.report.stages;
+  CHECK(std::ranges::any_of(stages, [](const StageRecord& stage) { return !stage.kept; }));
+  REQUIRE(result.report.last_kept_stage() != nullptr);
+  CHECK(result.report.last_kept_stage()->cells == result.mesh.num_cells());
+}
+
 TEST_CASE("A plate a hundred times as wide as thick keeps its thickness", "[slow]") {
   TriangleMesh plate = test::cube_surface(2, false);
   for (Vec3& p : plate.positions) p.z() /= 100;

@@ -17,7 +17,7 @@ using namespace subvol::test;
 namespace {
 
 NormalDeviation deviation(const TriangleMesh& fitted, const TriangleMesh& target) {
-  return normal_deviation(fitted, target, ClosestPoint(target), 20000);
+  return normal_deviation(fitted, ClosestPoint(fitted), target, ClosestPoint(target), 20000);
 }
 
 /// A square of side 1, folded by an angle along x = 0.5: two halves that rise on either side.
