@@ -12,6 +12,8 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <numeric>
 #include <span>
 
@@ -40,8 +42,8 @@ constexpr Parser kParsers[] = {{".off", parse_off}, {".obj", parse_obj}, {".stl"
 class Remarks {
  public:
   Remarks(std::string name, std::vector<std::string>* warnings) : name_(std::move(name)), warnings_(warnings) {}
-  void count(std::size_t n, const char* what) {
-    if (n > 0 && warnings_) warnings_->push_back(name_ + ": " + std::to_string(n) + " " + what);
+  void count(std::size_t n, const char* what, const char* of_one) {
+    if (n > 0 && warnings_) warnings_->push_back(name_ + ": " + std::to_string(n) + " " + (n == 1 ? of_one : what));
   }
   void tell(const std::vector<std::string>& remarks) {
     if (!warnings_) return;
@@ -83,8 +85,10 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   mesh.face_vertices = std::move(kept.face_vertices);
   mesh.face_offsets = std::move(kept.face_offsets);
   if (!of_face.empty()) of_face.resize(mesh.num_faces());
-  remarks.count(num_shortened, "faces repeat a corner: the repetition is dropped");
-  remarks.count(num_dropped, "faces have fewer than three different corners or name one twice: dropped");
+  remarks.count(num_shortened, "faces repeat a corner: the repetition is dropped",
+                "face repeats a corner: the repetition is dropped");
+  remarks.count(num_dropped, "faces have fewer than three different corners or name one twice: dropped",
+                "face has fewer than three different corners or names one twice: dropped");
   if (mesh.num_faces() == 0) remarks.fail(num_dropped ? "no usable faces" : "no faces");
 }
 
@@ -206,11 +210,48 @@ PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* wa
   return sound_polygons(std::move(parsed.mesh), path.string(), warnings);
 }
 
+namespace {
+
+/// Refuses a surface of which a vertex is so far away that the rest is a point beside it: a digit was lost, or a
+/// coordinate was never set.
+void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& remarks) {
+  constexpr double kStray = 1e6;  // times the distance of most vertices
+  constexpr double kMost = 0.75;  // share of the vertices
+  const auto place = static_cast<std::ptrdiff_t>(kMost * static_cast<double>(positions.size() - 1));
+  std::vector<double> values(positions.size());
+  Vec3 middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t v = 0; v < positions.size(); ++v) values[v] = positions[v][axis];
+    const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), median, values.end());
+    middle[axis] = *median;
+  }
+  for (std::size_t v = 0; v < positions.size(); ++v) values[v] = (positions[v] - middle).stableNorm();
+  const auto farthest = static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin());
+  const double largest = values[farthest];
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  const double usual = values[static_cast<std::size_t>(place)];
+  if (!(usual > 0) || largest <= kStray * usual) return;
+  std::string place_text;
+  for (int axis = 0; axis < 3; ++axis) {
+    place_text += axis == 0 ? "" : ", ";
+    append_number(place_text, positions[farthest][axis]);
+  }
+  std::string figure;
+  append_number(figure, std::round(largest / usual));
+  remarks.fail("the vertex at (" + place_text + ") is " + figure +
+               " times as far away as three quarters of the vertices: is a coordinate wrong?");
+}
+
+}  // namespace
+
 PolygonMesh sound_polygons(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings) {
   Remarks remarks(name, warnings);
   drop_bad_faces(mesh, remarks);
-  remarks.count(drop_unused(mesh.positions, mesh.face_vertices), "vertices belong to no face: dropped");
+  remarks.count(drop_unused(mesh.positions, mesh.face_vertices), "vertices belong to no face: dropped",
+                "vertex belongs to no face: dropped");
   check_extent(mesh.positions, remarks);
+  check_stray_vertices(mesh.positions, remarks);
   return mesh;
 }
 
@@ -223,8 +264,9 @@ TriangleMesh sound_triangles(PolygonMesh polygons, const std::string& name, std:
   TriangleMesh mesh = triangulate(polygons);
   const std::size_t num_flat =
       drop_triangles(mesh, [&](std::size_t i) { return !has_area(mesh.positions, mesh.triangles[i]); });
-  remarks.count(num_flat, "triangles have no area: dropped");
-  remarks.count(drop_duplicates(mesh), "triangles are there more than once: the first is kept");
+  remarks.count(num_flat, "triangles have no area: dropped", "triangle has no area: dropped");
+  remarks.count(drop_duplicates(mesh), "triangles are there more than once: the first is kept",
+                "triangle is there more than once: the first is kept");
   if (mesh.triangles.empty()) remarks.fail("no triangle has any area");
   drop_unused(mesh.positions, {mesh.triangles.front().data(), 3 * mesh.triangles.size()});
   return mesh;
@@ -242,12 +284,14 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
   if (extension == ".xyz") {
     std::size_t longer_lines = 0;
     cloud.points = parse_xyz(path.string(), read_file(path), longer_lines);
-    remarks.count(longer_lines, "lines have more than three columns: the rest is skipped");
+    remarks.count(longer_lines, "lines have more than three columns: the rest is skipped",
+                  "line has more than three columns: the rest is skipped");
   } else if (extension == ".ply") {
     ParsedSurface parsed = parse_ply(path.string(), read_file(path));
     remarks.tell(parsed.warnings);
     PolygonMesh& mesh = parsed.mesh;
-    remarks.count(mesh.num_faces(), "faces are skipped: only the points are read");
+    remarks.count(mesh.num_faces(), "faces are skipped: only the points are read",
+                  "face is skipped: only the points are read");
     cloud.points = std::move(mesh.positions);
   } else {
     remarks.fail("unknown extension " + in_quotes(extension) + " of points, expected " + point_cloud_formats());
@@ -259,7 +303,8 @@ PointCloud internal::sound_points(std::vector<Vec3> points, const std::string& n
   Remarks remarks(name, warnings);
   if (points.empty()) remarks.fail("no points");
   check_extent(points, remarks);
-  remarks.count(drop_repeated(points), "points are there more than once: the first is kept");
+  remarks.count(drop_repeated(points), "points are there more than once: the first is kept",
+                "point is there more than once: the first is kept");
   if (points.size() < kLeastCloudPoints)
     remarks.fail("only " + std::to_string(points.size()) + " points, expected at least " +
                  std::to_string(kLeastCloudPoints));

@@ -242,8 +242,8 @@ TEST_CASE("what is dropped is said: unused vertices, repeated corners, faces wit
   CHECK(mesh.positions.size() == 4);
   std::string all;
   for (const std::string& warning : warnings) all += warning + "\n";
-  CHECK_THAT(all, Contains("1 vertices belong to no face") && Contains("1 faces repeat a corner") &&
-                      Contains("2 faces have fewer than three") && Contains("1 triangles have no area") &&
+  CHECK_THAT(all, Contains("1 vertex belongs to no face") && Contains("1 face repeats a corner") &&
+                      Contains("2 faces have fewer than three") && Contains("1 triangle has no area") &&
                       Contains("2 triangles are there more than once"));
   CHECK(warnings.size() == 5);
 }
@@ -360,6 +360,15 @@ TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
     CAPTURE(n);
     CHECK_THROWS_AS(read_triangles("a.ply", good.substr(0, n)), InputError);
   }
+}
+
+TEST_CASE("A surface with a stray vertex is refused with its place") {
+  std::string text = "OFF\n5 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nFAR 0 0\n";
+  text += "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 4\n3 2 3 4\n3 3 1 4\n";
+  const auto with = [&](const std::string& far) { return std::string(text).replace(text.find("FAR"), 3, far); };
+  CHECK_THROWS_WITH(read_triangles("a.off", with("1e30")),
+                    Contains("the vertex at (1e+30, 0, 0) is") && Contains("times as far away as three quarters"));
+  CHECK(read_triangles("a.off", with("1000")).triangles.size() == 6);
 }
 
 TEST_CASE("surfaces without extent, or whose areas leave the range of a double, are refused") {
