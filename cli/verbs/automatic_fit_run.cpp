@@ -46,6 +46,7 @@ class AutomaticFitRun : public CageRun {
   void write();
   void check();
   Json report() const;
+  Json used(Json options) const;
   void summarize() const;
   bool has_cage() const { return result_.cage.num_cells() > 0; }
 
@@ -109,7 +110,7 @@ void AutomaticFitRun::fit() {
 void AutomaticFitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
-  writing.options = options_of_result(verb_);
+  writing.options = used(options_of_result(verb_));
   if (has_cage()) return write_cage(result_.cage, result_.mesh, result_.states, writing);
   write_each([&](const Output& output) {
     if (output.part == Part::animation)
@@ -134,10 +135,16 @@ void AutomaticFitRun::check() {
   hold_to_quality(arguments_.least_quality, mesh_check_, result_.report);
 }
 
+/// Returns the options without those that play no part.
+Json AutomaticFitRun::used(Json options) const {
+  for (const std::string& name : arguments_.unused_options) options.erase(name);
+  return options;
+}
+
 Json AutomaticFitRun::report() const {
   Json json{{"subvol", version()},
             {"command", "fit"},
-            {"options", options_in_force(verb_)},
+            {"options", used(options_in_force(verb_))},
             {"input", {{"target", describe(arguments_.target, target_)}}},
             {"repairs", repairs_}};
   json.update(automatic_fit_json(result_));

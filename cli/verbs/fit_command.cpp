@@ -366,6 +366,9 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
   fit.max_iterations = arguments.fit.max_iterations;
   fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  result.unused_options = {"basis", "map-tolerance", "adaptive"};
+  for (const std::string option : kMethodOptions) result.unused_options.push_back(option.substr(2));
+  if (!fit.makes_cage) result.unused_options.push_back("levels");
   return result;
 }
 
