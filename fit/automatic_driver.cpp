@@ -154,8 +154,10 @@ std::vector<Index> AutomaticDriver::cells_that_meet(const VolumeMesh& mesh) cons
 }
 
 /// Returns the cells at faces that meet and those below the hopeless quality, ascending.
-std::vector<Index> AutomaticDriver::hopeless_cells() const {
-  std::vector<Index> cells = cells_that_meet(mesh_);
+/// may_meet: false if no faces are known to meet.
+std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
+  std::vector<Index> cells;
+  if (may_meet) cells = cells_that_meet(mesh_);
   const std::vector<double> least = measure_quality(mesh_).cell_minima;
   for (std::size_t c = 0; c < least.size(); ++c)
     if (least[c] < hopeless_quality(options_)) cells.push_back(static_cast<Index>(c));
@@ -175,7 +177,7 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
   double surface = kFirst;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0, fruitless = 0; round < kMostRounds; ++round, surface *= kLess) {
-    const std::vector<Index> cells = hopeless_cells();
+    const std::vector<Index> cells = hopeless_cells(round > 0 || meets_itself(result_.trials.back()));
     if (runner_.is_to_end()) {
       note_end_in("the relaxation of hopeless cells");
       return false;

@@ -140,7 +140,7 @@ class AutomaticDriver {
  private:
   std::vector<Vec3>& unknowns() { return cage_ ? cage_->cage.positions : mesh_.positions; }
   static QualitySchedule aiming_at(double max_percent, QualitySchedule schedule);
-  std::vector<Index> hopeless_cells() const;
+  std::vector<Index> hopeless_cells(bool may_meet) const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 
   bool has_started_ = false;        ///< a mesh has been fitted

@@ -116,7 +116,7 @@ bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
   for (int round = 0; round < kMostRoutings; ++round) {
     if (round > 0) lay_out(routing);
     if (!fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) return false;
-    const std::vector<double> faults = faults_of_cells();
+    const std::vector<double> faults = faults_of_cells(true);
     const double sum = std::accumulate(faults.begin(), faults.end(), 0.0);
     if (sum >= least_faults) break;  // what was given up has not helped
     least_faults = sum;
@@ -140,7 +140,7 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
     trial.pads = layout_->pads.pads.size();
     if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;
-    const std::vector<double> faults = faults_of_cells();
+    const std::vector<double> faults = faults_of_cells(meets_itself(result_.trials.back()));
     if (!relax_last_trial()) return false;
     if (merit >= least_merit) break;  // what was given up has not helped
     least_merit = merit;

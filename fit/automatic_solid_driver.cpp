@@ -138,8 +138,8 @@ bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule,
   return going;
 }
 
-std::optional<FeatureMiss> AutomaticSolidDriver::feature_miss(const TriangleMesh& surface) const {
-  std::optional<FeatureMiss> miss = largest_feature_miss(features_, ClosestPoint(surface));
+std::optional<FeatureMiss> AutomaticSolidDriver::feature_miss(const ClosestPoint& surface) const {
+  std::optional<FeatureMiss> miss = largest_feature_miss(features_, surface);
   if (!miss) return miss;
   miss->place = target_.normalization.from_unit({miss->place})[0];
   miss->size_percent = 100 * miss->size;
@@ -182,14 +182,18 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
     state_.cells.least_share = std::min(state_.cells.least_share, quality.cell_minima[c] / options_.quality);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   trial.mean_percent = trial.max_percent = 0;  // the trial may have those of another state
-  const auto measure = [&](const TriangleMesh& fitted) {
-    const SurfaceDistance distance = target_.distance(fitted);
+  const ClosestPoint surface_tree(surface);
+  const auto measure = [&](const TriangleMesh& fitted, const ClosestPoint& tree) {
+    const SurfaceDistance distance = target_.distance(fitted, tree);
     trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
     trial.max_percent = std::max(trial.max_percent, 100 * distance.max());
   };
-  measure(surface);
-  if (cage_) measure(cage_->limit_surface());
-  trial.feature_miss = feature_miss(surface);
+  measure(surface, surface_tree);
+  if (cage_) {
+    const TriangleMesh limit = cage_->limit_surface();
+    measure(limit, ClosestPoint(limit));
+  }
+  trial.feature_miss = feature_miss(surface_tree);
   trial.solid_volume_percent = volume_difference_percent(surface, target_.surface);
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
@@ -202,12 +206,13 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
   return going;
 }
 
-std::vector<double> AutomaticSolidDriver::faults_of_cells() const {
+std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
   constexpr double kMeets = 1;
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
     faults.push_back(std::max(0.0, kAcceptableQuality - least));
-  for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
+  if (may_meet)
+    for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
   return cage_ ? cage_->sums_of_parts(faults) : faults;
 }
 
@@ -238,7 +243,7 @@ void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
 
 std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   std::vector<Fault> faults;
-  if (best().self_intersections != std::size_t{0}) {
+  if (meets_itself(best())) {
     std::vector<Index> meeting = cells_that_meet(result_.mesh);
     std::ranges::sort(meeting);
     meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());

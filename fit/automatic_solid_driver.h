@@ -54,7 +54,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// fit must end.
   bool judge(AutomaticFitTrial trial) override;
   /// Returns how poor each cell of the present mesh, or of its cage, is, 0 for good ones.
-  std::vector<double> faults_of_cells() const;
+  /// may_meet: false if the boundary is known not to meet itself.
+  std::vector<double> faults_of_cells(bool may_meet) const;
   /// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh
   /// if not. First those whose faces meet others, then the poor ones, the worst first, then those too far from the
   /// target, then those at edges without a path, the longest first, then those at small features.
@@ -71,7 +72,7 @@ class AutomaticSolidDriver : protected AutomaticDriver {
 
  private:
   /// Returns the largest miss of the target's small features by a surface, in the target's unit and coordinates.
-  std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
+  std::optional<FeatureMiss> feature_miss(const ClosestPoint& surface) const;
   /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
   std::optional<CreaseDistance> distance_of_edges() const;
   /// Returns the curves that the present mesh does not follow: all of them if it follows none.

@@ -47,6 +47,9 @@ double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& opti
 /// Returns true if all cells are certified and the boundary is found not to meet itself.
 bool is_valid(const AutomaticFitTrial& trial);
 
+/// Returns false if the boundary of a trial is known not to meet itself.
+inline bool meets_itself(const AutomaticFitTrial& trial) { return trial.self_intersections != std::size_t{0}; }
+
 /// Returns true if a trial is so good that it is polished, and neither smaller cells nor, with edges to follow, another
 /// template is tried.
 bool is_good_enough(const AutomaticFitTrial& trial);

@@ -154,15 +154,18 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
   auto volume = std::make_unique<QualityEnergy>(*whole.energy_, *mesh_, patch.cells);
   energy_ = volume.get();
 
-  // What does not move with the patch is fixed where it is.
-  std::vector<Vec3> outside(x.begin(), x.end());
-  for (const Index j : patch.unknowns) outside[j].setZero();
-  std::vector<Vec3> all_nodes(problem.nodes.num_rows()), all_samples(problem.samples.num_rows());
-  problem.apply_nodes(outside, all_nodes);
-  problem.apply_samples(outside, all_samples);
-  const auto fixed_part = [](const std::vector<Vec3>& all, std::span<const Index> rows) {
+  // What does not move with the patch is fixed where it is. Only rows of the patch are looked at: the patches of a
+  // large mesh are many.
+  const auto fixed_part = [&](const SparseMap& map, std::span<const Vec3> fixed, std::span<const Index> rows) {
     std::vector<Vec3> part;
-    for (const Index row : rows) part.push_back(all[row]);
+    for (const Index row : rows) {
+      const auto columns = map.row_columns(row);
+      const auto values = map.row_values(row);
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t k = 0; k < columns.size(); ++k)
+        if (!std::ranges::binary_search(patch.unknowns, columns[k])) sum += values[k] * x[columns[k]];
+      part.push_back(fixed.empty() ? sum : Vec3(sum + fixed[row]));
+    }
     return part;
   };
 
@@ -170,7 +173,7 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
   std::unique_ptr<ClosestPointEnergy> surface;
   SparseMap samples{patch.unknowns.size(), {0}, {}, {}};
   if (whole.surface_ && !patch.triangles.empty()) {
-    std::vector<std::uint8_t> is_used(all_samples.size(), 0);
+    std::vector<std::uint8_t> is_used(problem.samples.num_rows(), 0);
     for (const Index t : patch.triangles)
       for (const Index sample : whole.surface_->triangles()[t]) is_used[sample] = 1;
     if (whole.surface_->creases())
@@ -180,7 +183,7 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
                                        [&](Index j) { return std::ranges::binary_search(patch.unknowns, j); });
           },
           is_used);
-    std::vector<Index> numbers(all_samples.size(), kNoIndex);
+    std::vector<Index> numbers(is_used.size(), kNoIndex);
     for (std::size_t i = 0; i < is_used.size(); ++i) {
       if (!is_used[i]) continue;
       numbers[i] = static_cast<Index>(rows.size());
@@ -196,8 +199,8 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
   }
   problem_ = std::make_unique<FitProblem>(select(problem.nodes, patch.vertices, patch.unknowns), std::move(samples),
                                           std::move(volume), std::move(surface), problem.lambda);
-  problem_->fixed_nodes = fixed_part(all_nodes, patch.vertices);
-  problem_->fixed_samples = fixed_part(all_samples, rows);
+  problem_->fixed_nodes = fixed_part(problem.nodes, problem.fixed_nodes, patch.vertices);
+  problem_->fixed_samples = fixed_part(problem.samples, problem.fixed_samples, rows);
 }
 
 bool QualityStages::run_stage(const QualityStage& stage, const std::string& name, bool is_lift, std::vector<Vec3>& x) {

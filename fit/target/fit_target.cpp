@@ -230,7 +230,10 @@ void FitTarget::sample(std::size_t num_samples, std::size_t least, std::size_t m
 }
 
 SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, bool extremes) const {
-  const ClosestPoint fitted_tree(fitted);
+  return distance(fitted, ClosestPoint(fitted), extremes);
+}
+
+SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, const ClosestPoint& fitted_tree, bool extremes) const {
   return tree ? surface_distance(fitted, fitted_tree, mesh, *tree, {.extremes = extremes})
               : surface_distance(fitted_tree, surface.samples());
 }

@@ -78,6 +78,8 @@ struct FitTarget {
   /// Returns the symmetric distances to another surface; for a cloud, those of its points to the surface.
   /// extremes  as in `SurfaceDistanceOptions`.
   SurfaceDistance distance(const TriangleMesh& fitted, bool extremes = true) const;
+  /// Returns the same with the other surface's tree.
+  SurfaceDistance distance(const TriangleMesh& fitted, const ClosestPoint& fitted_tree, bool extremes = true) const;
   double mean_distance(const TriangleMesh& fitted) const { return distance(fitted, false).mean(); }
 
   /// Returns the symmetric distances between the interfaces and those of a mesh with the same pairs of regions: the
