@@ -260,10 +260,10 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
   return true;
 }
 
-AutomaticFitResult AutomaticDriver::finish(bool going) {
+AutomaticFitResult AutomaticDriver::finish(bool going, const char* edges) {
   if (!going && result_.report.explanation.empty()) note_end_in("the fit");
   if (!going && !result_.trials.empty())
-    warn_of_missed_edges(result_.missed_edges, best().curves, "sharp edges", result_.report);
+    warn_of_missed_edges(result_.missed_edges, best().curves, edges, result_.report);
   if (options_.cells && result_.mesh.num_cells() > *options_.cells)
     result_.report.warnings.push_back(
         formatted("the result has %zu cells, more than the %zu allowed: no template with "

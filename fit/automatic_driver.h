@@ -120,8 +120,8 @@ class AutomaticDriver {
   bool keep_if_best(AutomaticFitTrial trial, const QualityReport& quality, std::optional<CreaseDistance> edges,
                     std::span<const UnfollowedCurve> unfollowed);
   /// Brings the result into the target's coordinates.
-  /// going  false if the fit was ended early.
-  AutomaticFitResult finish(bool going);
+  /// going  false if the fit was ended early.  edges  what the target's curves are called.
+  AutomaticFitResult finish(bool going, const char* edges);
 
   AutomaticFitOptions options_;
   FitTarget target_;

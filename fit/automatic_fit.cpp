@@ -312,7 +312,7 @@ AutomaticFitResult AutomaticFit::run() {
     going = polish();
   }
   if (going) conclude_fit(result_, options_);
-  return finish(going);
+  return finish(going, "sharp edges");
 }
 
 }  // namespace

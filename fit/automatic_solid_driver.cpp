@@ -41,7 +41,8 @@ void AutomaticSolidDriver::find_edges() {
 }
 
 void AutomaticSolidDriver::find_features() {
-  constexpr std::size_t kMostSamples = 200'000;  // of large scans; a feature is larger than their spacing
+  // Of larger targets, features below the spacing of so many samples, 0.2 % of the root of the area, may be missed.
+  constexpr std::size_t kMostSamples = 200'000;
   target_.sample(0, kLeastTargetSamples, kMostSamples);
   const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
   features_ = feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2),

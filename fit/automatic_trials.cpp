@@ -206,7 +206,7 @@ void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options
     const FeatureMiss& miss = *chosen.feature_miss;
     report.warnings.push_back(
         formatted("a narrow place of radius %.4g (a hole, pin, wall or slot, or the tip of a wedge) is missed by %.4g, "
-                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells come nearer",
+                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); a mesh with more cells comes nearer",
                   miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
   warn_of_missed_edges(result.missed_edges, chosen.curves, "sharp edges", report);

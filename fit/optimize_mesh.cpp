@@ -247,10 +247,9 @@ bool MeshOptimizer::attempt(double least_jacobian) {
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
-  if (!going) return false;
   flatten(least_jacobian);
   keep_volumes();
-  return true;
+  return going;
 }
 
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {

@@ -383,7 +383,7 @@ AutomaticFitResult RegionFit::run() {
   if (going) going = polish();
   if (going) conclude();
   if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
-  return finish(going);
+  return finish(going, "curves");
 }
 
 }  // namespace

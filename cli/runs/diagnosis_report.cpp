@@ -247,11 +247,12 @@ FillingForecast forecast_filling(const std::filesystem::path& path, const std::v
   try {
     FillingForecast forecast{load_to_fill(path, {}, warnings), ""};
     const std::string file = path.string() + ": ";
-    for (std::string& warning : warnings) {
-      if (std::ranges::find(told, warning) != told.end()) continue;
-      if (warning.starts_with(file)) warning.erase(0, file.size());
-      forecast.repair.done.insert(forecast.repair.done.begin(), std::move(warning));
-    }
+    std::vector<std::string> of_reader;
+    for (const std::string& warning : warnings)
+      if (std::ranges::find(told, warning) == told.end())
+        of_reader.push_back(warning.starts_with(file) ? warning.substr(file.size()) : warning);
+    std::vector<std::string>& done = forecast.repair.done;
+    done.insert(done.begin(), of_reader.begin(), of_reader.end());
     return forecast;
   } catch (const InputError& e) {
     return {{}, e.what()};

@@ -198,8 +198,8 @@ EdgeDecision decide_about_edges(const TriangleMesh& mesh, std::optional<double> 
     for (const Index v : triangle) box.extend(mesh.positions[v]);
   for (const FeatureCurve& curve : curves.curves) length += curve.length();
   return {false,
-          formatted("the target is taken for a scan or a sculpture, because what is beside its sharp edges bends, "
-                    "too: %zu curves above %g degrees (%.3g %% of the diagonal in all) are not followed; they are "
+          formatted("the target is taken for a scan or a sculpture, because the faces beside its sharp edges are bent "
+                    "as well: %zu curves above %g degrees (%.3g %% of the diagonal in all) are not followed; they are "
                     "if a crease angle is given (--crease-angle %g)",
                     curves.curves.size(), *angle_degrees, 100 * length / box.diagonal().norm(), *angle_degrees)};
 }

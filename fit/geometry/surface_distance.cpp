@@ -47,22 +47,32 @@ struct Samples {
   double area = 0;          ///< of all triangles
 };
 
-/// Returns the number of points at which an edge is sampled: where a surface is sharp or ends, a fitted one is
-/// farthest. at_edge  the sides of triangles there.  spacing  of the samples.
+/// Returns the number of points at which an edge is sampled, which is odd: where a surface is sharp or ends, a fitted
+/// one is farthest. at_edge  the sides of triangles that are known there; one may be an edge beside triangles that are
+/// not (`all_known`). spacing  of the samples.
 template <class Keyed>
 int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::span<const Keyed> at_edge,
-                   double spacing) {
+                   bool all_known, double spacing) {
   constexpr double kSmoothCosine = 0.985;  // of 10 degrees
   constexpr double kMost = 1000;
+  if (at_edge.size() == 1 && !all_known) return 1;
+  const auto corners = [&](const Keyed& side) { return mesh.triangles[order[side.edge.place]]; };
   const auto normal = [&](const Keyed& side) -> Vec3 {
-    const auto& [a, b, c] = mesh.triangles[order[side.edge.place]];
+    const auto [a, b, c] = corners(side);
     return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
   };
-  if (at_edge.size() == 2 && std::abs(normal(at_edge[0]).dot(normal(at_edge[1]))) > kSmoothCosine) return 1;
-  const auto& corners = mesh.triangles[order[at_edge[0].edge.place]];
+  const auto is_forward = [&](const Keyed& side) {
+    const int k = side.edge.corner;
+    return corners(side)[k] < corners(side)[(k + 1) % 3];
+  };
+  if (at_edge.size() == 2) {
+    const double sign = is_forward(at_edge[0]) == is_forward(at_edge[1]) ? -1 : 1;
+    if (sign * normal(at_edge[0]).dot(normal(at_edge[1])) > kSmoothCosine) return 1;
+  }
   const int k = at_edge[0].edge.corner;
-  const double length = (mesh.positions[corners[(k + 1) % 3]] - mesh.positions[corners[k]]).norm();
-  return spacing > 0 ? static_cast<int>(std::clamp(std::round(length / spacing) - 1, 1.0, kMost)) : 1;
+  const double length =
+      (mesh.positions[corners(at_edge[0])[(k + 1) % 3]] - mesh.positions[corners(at_edge[0])[k]]).norm();
+  return spacing > 0 ? static_cast<int>(std::clamp(std::round(length / spacing) - 1, 1.0, kMost)) | 1 : 1;
 }
 
 /// Returns the edges of the triangles that are cut, each once, in ascending order of their places.
@@ -86,12 +96,13 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
   const auto at = [](const Samples::Edge& edge) { return std::pair(edge.place, edge.corner); };
   std::sort(all.begin(), all.end(),
             [&](const Keyed& a, const Keyed& b) { return a.key != b.key ? a.key < b.key : at(a.edge) < at(b.edge); });
+  const bool all_known = std::ranges::find(cuts, 0) == cuts.end();
   std::vector<Samples::Edge> edges;
   for (std::size_t first = 0, last; first < all.size(); first = last) {
     for (last = first + 1; last < all.size() && all[last].key == all[first].key;) ++last;
     edges.push_back(all[first].edge);
     edges.back().points =
-        points_of_edge(mesh, order, std::span<const Keyed>(all).subspan(first, last - first), spacing);
+        points_of_edge(mesh, order, std::span<const Keyed>(all).subspan(first, last - first), all_known, spacing);
   }
   std::sort(edges.begin(), edges.end(), [&](const Samples::Edge& a, const Samples::Edge& b) { return at(a) < at(b); });
   return edges;

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <set>
 #include <span>
 #include <utility>
@@ -44,8 +46,8 @@ std::size_t drop_repeated(TriangleMesh& surface) {
   return count;
 }
 
-/// Turns triangles that lie against the majority of their part; parts end at edges of more than two triangles. Returns
-/// how many; 0 if a part cannot be oriented.
+/// Turns triangles that lie against the majority of their part, if the part can be oriented; parts end at edges of more
+/// than two triangles. Returns how many.
 std::size_t turn_minorities(TriangleMesh& surface) {
   const std::size_t num_triangles = surface.triangles.size();
   struct Neighbor {
@@ -67,6 +69,7 @@ std::size_t turn_minorities(TriangleMesh& surface) {
     if (turns[seed] != Turn::unknown) continue;
     turns[seed] = Turn::keep;
     std::vector<Index> part{static_cast<Index>(seed)}, turned;
+    bool can_be_oriented = true;
     for (std::size_t i = 0; i < part.size(); ++i) {
       const Index t = part[i];
       if (turns[t] == Turn::turn) turned.push_back(t);
@@ -76,10 +79,11 @@ std::size_t turn_minorities(TriangleMesh& surface) {
           turns[neighbor.triangle] = wanted;
           part.push_back(neighbor.triangle);
         } else if (turns[neighbor.triangle] != wanted) {
-          return 0;
+          can_be_oriented = false;
         }
       }
     }
+    if (!can_be_oriented) continue;
     const bool is_majority = 2 * turned.size() > part.size();
     for (const Index t : part)
       if ((turns[t] == Turn::turn) != is_majority) to_turn.push_back(t);
@@ -110,14 +114,15 @@ class OpenVertices {
   }
 
   /// Returns the vertices inside the edge from a to b, in this order.
-  std::vector<Index> on_edge(Index a, Index b) const {
+  std::vector<Index> on_edge(Index a, Index b) {
     const Vec3 &p = positions_[a], along = positions_[b] - p;
     const double length = along.norm();
-    if (!(length > 2 * tolerance_)) return {};
+    if (!(length > 2 * tolerance_) || num_tests_ > kMostTests) return {};
     const auto [low, high] = std::minmax(p[axis_], positions_[b][axis_]);
     auto at = std::ranges::lower_bound(vertices_, low - tolerance_, {}, [&](Index v) { return positions_[v][axis_]; });
     std::vector<std::pair<double, Index>> found;
     for (; at != vertices_.end() && positions_[*at][axis_] <= high + tolerance_; ++at) {
+      ++num_tests_;
       if (*at == a || *at == b) continue;
       const Vec3 offset = positions_[*at] - p;
       const double place = offset.dot(along) / length;
@@ -135,58 +140,74 @@ class OpenVertices {
   double tolerance_;
   int axis_ = 0;
   std::vector<Index> vertices_;  ///< ascending along the axis
+  static constexpr std::size_t kMostTests = 300'000'000;  ///< a second; a surface that needs more is a soup
+  std::size_t num_tests_ = 0;
 };
 
-/// Cuts triangles at the vertices that lie on one of their open edges, each triangle once. Returns the number of
-/// vertices at which it cuts.
-std::size_t cut_once(TriangleMesh& surface, double tolerance) {
+/// An open edge, from a to b as its triangle runs, and the vertices inside it, in this order.
+struct OpenEdge {
+  Index a, b;
+  std::vector<Index> inside;
+
+  std::vector<Index> chain() const {
+    std::vector<Index> all{a};
+    all.insert(all.end(), inside.begin(), inside.end());
+    all.push_back(b);
+    return all;
+  }
+};
+
+/// Calls visit(piece) for the parts of an edge between its vertices.
+template <class Visit>
+void for_each_piece(const OpenEdge& edge, const Visit& visit) {
+  const std::vector<Index> chain = edge.chain();
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) visit(edge_of(chain[i], chain[i + 1]));
+}
+
+/// Cuts triangles at the vertices that lie on their open edges, if a piece of the edge is a piece of exactly one other
+/// edge then. Returns the number of cuts.
+std::size_t cut_at_junctions(TriangleMesh& surface, double tolerance) {
   const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(surface.triangles, surface.positions.size());
   std::vector<SurfaceHalfEdge> open;
   for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> edge) {
     if (edge.size() == 1) open.push_back(edge[0]);
   });
-  const OpenVertices vertices(surface, open, tolerance);
-  std::set<Edge> open_edges;
-  for (const SurfaceHalfEdge& side : open) open_edges.insert({side.low, side.high});
-  std::vector<std::uint8_t> is_cut(surface.triangles.size(), 0);
-  std::size_t count = 0;
+  OpenVertices vertices(surface, open, tolerance);
+  std::vector<OpenEdge> edges;
+  std::map<Edge, Index> triangle_at;  // of each open edge
+  std::vector<Edge> pieces;
   for (const SurfaceHalfEdge& side : open) {
-    if (is_cut[side.triangle]) continue;
-    const auto corners = surface.triangles[side.triangle];
-    std::size_t first = 0;  // the corner at which the edge begins
-    while (edge_of(corners[first], corners[(first + 1) % 3]) != edge_of(side.low, side.high)) ++first;
-    const Index a = corners[first], b = corners[(first + 1) % 3], apex = corners[(first + 2) % 3];
-    std::vector<Index> chain = vertices.on_edge(a, b);
-    std::erase(chain, apex);
-    if (chain.empty()) continue;
-    chain.insert(chain.begin(), a);
-    chain.push_back(b);
-    bool closes = false;
-    for (std::size_t i = 0; i + 1 < chain.size(); ++i)
-      closes = closes || open_edges.contains(edge_of(chain[i], chain[i + 1]));
-    if (!closes) continue;
-    is_cut[side.triangle] = 1;
-    count += chain.size() - 2;
-    surface.triangles[side.triangle] = {chain[0], chain[1], apex};
+    const auto [a, b] = side.forward ? std::pair(side.low, side.high) : std::pair(side.high, side.low);
+    edges.push_back({a, b, vertices.on_edge(a, b)});
+    for (const Index corner : surface.triangles[side.triangle]) std::erase(edges.back().inside, corner);
+    for_each_piece(edges.back(), [&](const Edge& piece) { pieces.push_back(piece); });
+    triangle_at[edge_of(a, b)] = side.triangle;
+  }
+  std::ranges::sort(pieces);
+  std::size_t count = 0;
+  for (const OpenEdge& edge : edges) {
+    if (edge.inside.empty()) continue;
+    bool closes = false, is_crowded = false;
+    for_each_piece(edge, [&](const Edge& piece) {
+      const auto sharing = std::ranges::upper_bound(pieces, piece) - std::ranges::lower_bound(pieces, piece);
+      closes = closes || sharing == 2;
+      is_crowded = is_crowded || sharing > 2;
+    });
+    if (!closes || is_crowded) continue;
+    const Index t = triangle_at[edge_of(edge.a, edge.b)];
+    const auto corners = surface.triangles[t];
+    const Index apex = *std::ranges::find_if(corners, [&](Index v) { return v != edge.a && v != edge.b; });
+    const std::vector<Index> chain = edge.chain();
+    surface.triangles[t] = {chain[0], chain[1], apex};
     for (std::size_t i = 1; i + 1 < chain.size(); ++i) {
       surface.triangles.push_back({chain[i], chain[i + 1], apex});
-      if (!surface.face_groups.empty())
-        surface.face_groups.of_face.push_back(surface.face_groups.of_face[side.triangle]);
+      if (!surface.face_groups.empty()) surface.face_groups.of_face.push_back(surface.face_groups.of_face[t]);
     }
+    const auto last = triangle_at.find(edge_of(edge.b, apex));
+    if (last != triangle_at.end() && last->second == t) last->second = static_cast<Index>(surface.triangles.size() - 1);
+    count += edge.inside.size();
   }
   return count;
-}
-
-/// Cuts triangles at T-junctions. Returns the number of cuts.
-std::size_t cut_at_junctions(TriangleMesh& surface, double tolerance) {
-  constexpr int kMostPasses = 100;  // chains of junctions that take turns need several
-  std::size_t all = 0;
-  for (int pass = 0; pass < kMostPasses; ++pass) {
-    const std::size_t count = cut_once(surface, tolerance);
-    if (count == 0) break;
-    all += count;
-  }
-  return all;
 }
 
 }  // namespace

@@ -24,6 +24,7 @@ struct TidySurface {
 /// - Vertices on the open edge of a triangle, up to a millionth of the diagonal, cut the triangle there, if that closes
 ///   a piece of the edge (T-junctions: exporters of CAD programs write them where a long edge meets several short
 ///   ones).
+///   In a soup of which this would take more than a second, only some edges are looked at.
 ///
 /// surface  finite, with valid vertex numbers.  diagnosis: of this surface.
 /// returns  nothing if there is nothing of this to do. Triangles keep their groups.

@@ -13,7 +13,8 @@ bool MemoryBudget::allows(std::size_t size) {
   const double held = static_cast<double>(held_memory_bytes()), peak = static_cast<double>(peak_memory_bytes());
   if (size_ > 0 && peak > peak_) {  // else the last part has taken no more than what came before
     const double taken = peak - held_;
-    if (is_first_)
+    const bool is_small = rate_ * size_ < kMemoryOfAnyPart;
+    if (is_first_ && is_small)
       fixed_ = std::max(fixed_, taken - rate_ * size_);
     else
       rate_ = std::max(rate_, (taken - fixed_) / size_);

@@ -19,8 +19,8 @@ inline constexpr double kMemoryOfNode = 8e3;
 ///
 ///   expected = held now + fixed + rate * size
 ///
-/// Both figures start at measured bounds. What the first part takes beyond them is fixed: its size is small, and large
-/// targets take memory at any size. What a later part takes beyond them raises the rate.
+/// Both figures start at measured bounds. What the first part takes beyond them is fixed if its size is small: large
+/// targets take memory at any size. What a larger or later part takes beyond them raises the rate.
 class MemoryBudget {
  public:
   /// limit_bytes  limit for the process; 0: no limit.

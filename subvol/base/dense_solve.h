@@ -22,7 +22,8 @@ struct MatrixEntry {
 };
 
 /// Solves a square system of any size in the same sense: as above if it is small; else with the method of conjugate
-/// gradients, up to a relative residual of 1e-12 or as near as it comes in as many steps as there are unknowns.
+/// gradients on the normal equations, up to a relative residual of these of 1e-12, or as near as it comes in as many
+/// steps as there are unknowns. Callers that need more accuracy repeat it with what is left.
 ///
 /// entries  of A, with rows and columns below the size of `right`.
 Eigen::VectorXd least_norm_solution(const std::vector<MatrixEntry>& entries, const Eigen::VectorXd& right);

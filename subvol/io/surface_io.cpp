@@ -240,7 +240,7 @@ void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& rem
   std::string figure;
   append_number(figure, std::round(largest / usual));
   remarks.fail("the vertex at (" + place_text + ") is " + figure +
-               " times as far away as three quarters of the vertices: is a coordinate wrong?");
+               " times as far from the middle as three quarters of the vertices are: is a coordinate wrong?");
 }
 
 }  // namespace

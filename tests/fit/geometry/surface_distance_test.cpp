@@ -154,3 +154,16 @@ TEST_CASE("points so far away that squares overflow have a closest point all the
     CHECK(hit.distance == Approx(1e200));
   }
 }
+
+TEST_CASE("A fit that cuts off a sharp edge is seen between the ends and the middle of the edge",
+          "[surface_distance]") {
+  // A blade of about 5 degrees, and one whose edge is dented at a third of its length.
+  TriangleMesh blade, dented;
+  blade.positions = {{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0.04}, {0.5, 1, -0.04}};
+  blade.triangles = {{0, 1, 2}, {1, 0, 3}};
+  dented.positions = blade.positions;
+  dented.positions.push_back({1.0 / 3, 0.2, 0});
+  dented.triangles = {{0, 4, 2}, {4, 1, 2}, {4, 0, 3}, {1, 4, 3}};
+  const SurfaceDistance distance = surface_distance(blade, dented, {.num_samples = 100});
+  CHECK(distance.max_a_to_b.distance > 0.165);  // 0.144 from the middle
+}

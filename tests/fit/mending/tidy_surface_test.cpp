@@ -10,8 +10,10 @@
 
 #include <Eigen/Geometry>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +31,34 @@ std::string done(const SurfaceRepair& repair) {
 }
 
 double volume_of(const TriangleMesh& surface) { return internal::signed_volume_of(internal::welded(surface).mesh); }
+
+/// Returns a box whose faces have grids of their own, of so many squares a side, so that edges meet edges of other
+/// lengths. Each face is a group.
+TriangleMesh box_of_grids(const std::array<int, 6>& counts) {
+  TriangleMesh box;
+  const auto add_face = [&](const Vec3& origin, const Vec3& u, const Vec3& v, int n, int group) {
+    const auto first = static_cast<Index>(box.positions.size());
+    for (int j = 0; j <= n; ++j)
+      for (int i = 0; i <= n; ++i)
+        box.positions.push_back(origin + static_cast<double>(i) / n * u + static_cast<double>(j) / n * v);
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const Index a = first + j * (n + 1) + i, b = a + 1, c = b + n + 1, d = c - 1;
+        box.triangles.push_back({a, b, c});
+        box.triangles.push_back({a, c, d});
+        box.face_groups.of_face.insert(box.face_groups.of_face.end(), 2, group);
+      }
+    box.face_groups.groups.push_back({"face " + std::to_string(group), group + 1, 2});
+  };
+  const Vec3 x(2, 0, 0), y(0, 3, 0), z(0, 0, 4);
+  add_face({0, 0, 0}, y, x, counts[0], 0);
+  add_face({0, 0, 4}, x, y, counts[1], 1);
+  add_face({0, 0, 0}, x, z, counts[2], 2);
+  add_face({0, 3, 0}, z, x, counts[3], 3);
+  add_face({0, 0, 0}, z, y, counts[4], 4);
+  add_face({2, 0, 0}, y, z, counts[5], 5);
+  return box;
+}
 
 }  // namespace
 
@@ -53,30 +83,16 @@ TEST_CASE("Triangles that are there more than once are dropped, and that is told
   CHECK(repair.surface.triangles.size() == cube.triangles.size() - 2);
 }
 
+TEST_CASE("Long chains of T-junctions are cut at once", "[mending]") {
+  const TriangleMesh box = box_of_grids({20, 21, 20, 19, 21, 20});
+  const std::optional<internal::TidySurface> tidy = internal::tidy_surface(box, diagnose(box));
+  REQUIRE(tidy);
+  CHECK(tidy->done.size() == 1);
+  CHECK(diagnose(tidy->surface).is_fillable());
+}
+
 TEST_CASE("Triangles are cut at T-junctions", "[mending]") {
-  // The faces of a box have grids of their own, so that an edge meets edges of another length. 3 and 5 edges take turns.
-  TriangleMesh box;
-  const auto add_face = [&](const Vec3& origin, const Vec3& u, const Vec3& v, int n, int group) {
-    const auto first = static_cast<Index>(box.positions.size());
-    for (int j = 0; j <= n; ++j)
-      for (int i = 0; i <= n; ++i)
-        box.positions.push_back(origin + static_cast<double>(i) / n * u + static_cast<double>(j) / n * v);
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const Index a = first + j * (n + 1) + i, b = a + 1, c = b + n + 1, d = c - 1;
-        box.triangles.push_back({a, b, c});
-        box.triangles.push_back({a, c, d});
-        box.face_groups.of_face.insert(box.face_groups.of_face.end(), 2, group);
-      }
-    box.face_groups.groups.push_back({"face " + std::to_string(group), group + 1, 2});
-  };
-  const Vec3 x(2, 0, 0), y(0, 3, 0), z(0, 0, 4);
-  add_face({0, 0, 0}, y, x, 1, 0);
-  add_face({0, 0, 4}, x, y, 3, 1);
-  add_face({0, 0, 0}, x, z, 5, 2);
-  add_face({0, 3, 0}, z, x, 2, 3);
-  add_face({0, 0, 0}, z, y, 7, 4);
-  add_face({2, 0, 0}, y, z, 4, 5);
+  const TriangleMesh box = box_of_grids({1, 3, 5, 2, 7, 4});
   const SurfaceRepair repair = repair_surface(box);
   CHECK(repair.is_fillable);
   CHECK(done(repair).find("lie on open edges of triangles, which are cut there") != std::string::npos);
