@@ -2,6 +2,7 @@
 #include "subvol/io/surface_io.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/length_range.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/file_formats.h"
@@ -237,9 +238,7 @@ void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& rem
     place_text += axis == 0 ? "" : ", ";
     append_number(place_text, positions[farthest][axis]);
   }
-  std::string figure;
-  append_number(figure, std::round(largest / usual));
-  remarks.fail("the vertex at (" + place_text + ") is " + figure +
+  remarks.fail("the vertex at (" + place_text + ") is " + formatted("%.2g", largest / usual) +
                " times as far from the middle as three quarters of the vertices are: is a coordinate wrong?");
 }
 
