@@ -41,7 +41,8 @@ void AutomaticSolidDriver::find_edges() {
 }
 
 void AutomaticSolidDriver::find_features() {
-  // Of larger targets, features below the spacing of so many samples, 0.2 % of the root of the area, may be missed.
+  // Larger targets are not sampled more densely. Their features may be missed if they are smaller than the spacing of
+  // so many samples, 0.2 % of the root of the area.
   constexpr std::size_t kMostSamples = 200'000;
   target_.sample(0, kLeastTargetSamples, kMostSamples);
   const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;

@@ -192,8 +192,8 @@ void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options
         found);
   else if (chosen.least_scaled_jacobian < kNotablyLower * options.quality)
     report.warnings.push_back(
-        formatted("the least scaled Jacobian, %.3f, is below the quality of %.2f that was asked for: cells at sharp "
-                  "edges cannot be better than the angle there allows, and less is asked of them",
+        formatted("the least scaled Jacobian, %.3f, is below the quality of %.2f that was asked for: less is asked "
+                  "of cells at sharp edges, because of the angles there",
                   chosen.least_scaled_jacobian, options.quality));
   if (const std::optional<CreaseDistance>& edges = report.creases;
       edges && edges->num_followed > 0 && edges->max_percent() > options.max_tolerance_percent)

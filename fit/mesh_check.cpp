@@ -336,7 +336,7 @@ std::string label_of(int reference, const RegionReport& report) {
   return std::to_string(reference);
 }
 
-/// Of many regions and interfaces, the first ones are listed; the report in JSON has all.
+/// Lists the regions and interfaces: the first ones, if there are many. The report in JSON has all of them.
 void append_regions(std::string& text, const RegionReport& report) {
   static constexpr std::size_t kMostListed = 20;
   const auto listed = [](const auto& all) { return std::span(all).first(std::min(all.size(), kMostListed)); };

@@ -18,7 +18,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 namespace subvol::internal {

@@ -28,7 +28,7 @@ struct AutomaticFitArguments {
   std::string target;
   std::optional<double> wrap_percent;   ///< `WrapOptions::voxel_percent`; nothing: the target is not wrapped
   std::optional<double> size;           ///< edge length of the cells, in the target's unit; takes the place of fit.cells
-  std::vector<std::string> unused_options{};  ///< that have a default, which plays no part here: names without dashes
+  std::vector<std::string> unused_options{};  ///< names, without dashes, of options whose defaults play no part here
 };
 
 /// Fills a surface with hexes from files to files; returns an ExitStatus. Returns nothing, and has done nothing, if a

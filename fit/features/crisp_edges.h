@@ -25,7 +25,7 @@ struct EdgeCrispness {
 
   /// True for parts as they are designed, whose edges must stay. The bends of scans and sculptures exceed any angle in
   /// places, but their surroundings bend nearly as much, and are not planar; parts with many rounded edges have much
-  /// longer crisp ones, and edges at planes. Of 280 surfaces, the scans have a crisp share of less than 0.5, a relative
+  /// longer crisp ones, and edges at planes. Of 184 surfaces, the scans have a crisp share of less than 0.5, a relative
   /// length of less than 1, or at most 0.95 in the first sum, but for two coarse meshes of animals, and at most 1.24 in
   /// the second one. The parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
@@ -40,7 +40,7 @@ struct EdgeCrispness {
 /// mesh, curves  as for and from `feature_curves`. Cost: one sort of the edges and one of the triangles.
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves);
 
-/// What a fit does about the sharp edges of a surface.
+/// Says what a fit does about the sharp edges of a surface.
 struct EdgeDecision {
   bool follows = false;  ///< there are some, and they are a designed part's or all are to be followed
   std::string warning;   ///< if edges are left out that stand out: what they are, and how they are followed; else empty

@@ -154,8 +154,8 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
   auto volume = std::make_unique<QualityEnergy>(*whole.energy_, *mesh_, patch.cells);
   energy_ = volume.get();
 
-  // What does not move with the patch is fixed where it is. Only rows of the patch are looked at: the patches of a
-  // large mesh are many.
+  // Returns what is fixed in some rows: the part of the degrees of freedom that do not move with the patch. It looks at
+  // these rows alone, because a large mesh has many patches.
   const auto fixed_part = [&](const SparseMap& map, std::span<const Vec3> fixed, std::span<const Index> rows) {
     std::vector<Vec3> part;
     for (const Index row : rows) {

@@ -185,7 +185,7 @@ SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
 }
 
 SurfaceDistance FitTarget::interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const {
-  // The samples of all pairs of regions together: with many pairs, each has fewer.
+  // All pairs of regions share so many samples: if there are many pairs, each of them has fewer.
   constexpr std::size_t kMostSamples = 500'000, kLeastSamples = 500;
   const Index num_groups = groups.empty() ? 0 : *std::ranges::max_element(groups);
   const TrianglesByGroup of_fitted(fitted, groups), of_target(interfaces, group_of_interface_triangle);
