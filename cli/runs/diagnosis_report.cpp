@@ -108,13 +108,15 @@ SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, st
 /// Repairs a surface with the copies of triangles that the reader drops, if these tell more: two that face each other
 /// are a sheet between two regions, or walls of zero width where solids touch.
 ///
-/// repair    of the surface without the copies; replaced if the copies tell more.
+/// num_read  triangles of the surface without the copies.
+/// repair    of that surface; replaced if the copies tell more.
 /// warnings  those of the reader from `told` on are replaced with it: no copy was dropped then.
-void consider_copies(const std::filesystem::path& path, RegionRule rule, std::size_t told, SurfaceRepair& repair,
-                     std::vector<std::string>& warnings) {
+void consider_copies(const std::filesystem::path& path, RegionRule rule, std::size_t num_read, std::size_t told,
+                     SurfaceRepair& repair, std::vector<std::string>& warnings) {
   if (repair.regions || interrupted()) return;
   std::vector<std::string> own_warnings;
   const TriangleMesh surface = triangulate(read_polygon_mesh(path, &own_warnings));
+  if (surface.triangles.size() == num_read) return;
   if (repair.done.empty() && rule == RegionRule::automatic) repair.regions = find_regions(surface, rule);
   if (repair.regions || repair.is_fillable) return;
   SurfaceRepair with_copies = repair_surface(surface, interrupted, rule);
@@ -153,9 +155,10 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
   }
   if (!is_label_grid_file(path)) {
     const std::size_t told = warnings.size();
-    SurfaceRepair repair = repair_surface(load_surface(path, warnings), interrupted, rule);
+    const TriangleMesh read = load_surface(path, warnings);
+    SurfaceRepair repair = repair_surface(read, interrupted, rule);
     const bool may_have_copies = warnings.size() > told && is_surface_file(path);
-    if (may_have_copies) consider_copies(path, rule, told, repair, warnings);
+    if (may_have_copies) consider_copies(path, rule, read.triangles.size(), told, repair, warnings);
     return repair;
   }
   LabelGrid grid = read_label_grid(path);

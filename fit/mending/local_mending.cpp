@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -57,6 +58,7 @@ struct Patch {
   TriangleMesh mesh;             ///< dropped triangles are `kNone`
   std::vector<char> is_inner;    ///< vertices all of whose triangles are in the patch
   std::vector<char> is_border;   ///< vertices at an edge of one triangle, of the inner ones
+  Eigen::AlignedBox3d box;       ///< in which triangles are of the patch
 
   std::vector<std::size_t> at_edge(Index a, Index b) const {
     std::vector<std::size_t> found;
@@ -111,43 +113,87 @@ bool Patch::apply(const Change& change) {
   return true;
 }
 
+/// What is wrong with a patch.
+struct PatchFaults {
+  std::vector<std::array<Index, 2>> meeting;  ///< pairs of triangles that meet improperly
+  std::size_t num_flat = 0;                   ///< triangles without area
+  std::vector<double> clearances;  ///< per vertex: `clearance`; 1 if it is no inner vertex, or has no triangles
+};
+
+constexpr double kHidden = -1;  // clearance of a vertex without a direction
+
+/// Returns the least cosine between normals and the direction that sees all of them best; `kHidden` if there is none.
+double clearance(const std::vector<Vec3>& normals) {
+  if (std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return !(n.norm() > 0.5); })) return kHidden;
+  const std::optional<Vec3> direction = most_visible_direction(normals);
+  if (!direction) return kHidden;
+  double least = 1;
+  for (const Vec3& n : normals) least = std::min(least, direction->dot(n));
+  return least;
+}
+
+/// Returns what is wrong with a patch.
+/// before, known  the patch before a change, and its faults: only what the change touches is searched. Null: all is.
+PatchFaults faults_of(const Patch& patch, const Patch* before = nullptr, const PatchFaults* known = nullptr) {
+  const auto& triangles = patch.mesh.triangles;
+  const auto is_changed = [&](std::size_t t) {
+    if (!before || triangles[t] != before->mesh.triangles[t]) return true;
+    return std::any_of(triangles[t].begin(), triangles[t].end(),
+                       [&](Index v) { return patch.mesh.positions[v] != before->mesh.positions[v]; });
+  };
+  PatchFaults faults;
+  TriangleMesh alive{patch.mesh.positions, {}};
+  std::vector<Index> number;         // of the triangles that are left, in the patch
+  std::vector<std::uint8_t> marked;  // changed ones of them
+  std::vector<char> is_kept(triangles.size(), 0), is_touched(patch.mesh.positions.size(), before == nullptr);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const bool changed = triangles[t] == kNone ? before && before->mesh.triangles[t] != kNone : is_changed(t);
+    if (changed && before)
+      for (const Corners& corners : {triangles[t], before->mesh.triangles[t]})
+        for (const Index v : corners)
+          if (v != kNoIndex) is_touched[v] = 1;
+    if (triangles[t] == kNone) continue;
+    is_kept[t] = !changed;
+    alive.triangles.push_back(triangles[t]);
+    number.push_back(static_cast<Index>(t));
+    marked.push_back(changed);
+  }
+  const SelfIntersections found = self_intersections(alive, {}, marked);
+  if (known)
+    for (const auto& [t, s] : known->meeting)
+      if (is_kept[t] && is_kept[s]) faults.meeting.push_back({t, s});
+  for (const auto& [t, s] : found.pairs) faults.meeting.push_back({number[t], number[s]});
+  faults.num_flat = found.degenerate.size();
+  std::vector<std::vector<Vec3>> normals(is_touched.size());
+  for (const Corners& t : alive.triangles) {
+    if (std::none_of(t.begin(), t.end(), [&](Index v) { return is_touched[v]; })) continue;
+    const Vec3 normal = doubled_area_vector(patch.mesh, t).stableNormalized();
+    for (const Index v : t) normals[v].push_back(normal);
+  }
+  for (std::size_t v = 0; v < is_touched.size(); ++v) {
+    const bool has_none = !patch.is_inner[v] || normals[v].empty();
+    faults.clearances.push_back(!is_touched[v] ? known->clearances[v] : has_none ? 1.0 : clearance(normals[v]));
+  }
+  return faults;
+}
+
 /// How good a patch is: less is better.
 struct Rating {
   std::size_t faults = 0;
-  bool is_hard = false;   ///< from the best direction at some vertex, a triangle is seen almost edge-on
-  double distance = 0;    ///< of the changes
+  bool is_hard = false;  ///< from the best direction at some vertex, a triangle is seen almost edge-on
+  double distance = 0;   ///< of the changes
   friend bool operator<(const Rating& a, const Rating& b) {
     return std::tie(a.faults, a.is_hard, a.distance) < std::tie(b.faults, b.is_hard, b.distance);
   }
 };
 
-Rating rating_of(const Patch& patch, double distance, MendingGoal goal) {
+Rating rating_of(const PatchFaults& faults, double distance, MendingGoal goal) {
   constexpr double kEdgeOn = 0.1;  // cosine between a direction and a normal: 6 degrees
-  TriangleMesh alive{patch.mesh.positions, {}};
-  std::vector<std::vector<Vec3>> normals(patch.mesh.positions.size());
-  for (const Corners& t : patch.mesh.triangles) {
-    if (t == kNone) continue;
-    alive.triangles.push_back(t);
-    const Vec3 normal = doubled_area_vector(patch.mesh, t).stableNormalized();
-    for (const Index v : t) normals[v].push_back(normal);
-  }
-  const SelfIntersections found = self_intersections(alive);
-  Rating rating{found.pairs.size() + found.degenerate.size(), false, distance};
-  double least = 1;
-  for (std::size_t v = 0; v < normals.size(); ++v) {
-    if (!patch.is_inner[v] || normals[v].empty()) continue;
-    const bool is_flat =
-        std::any_of(normals[v].begin(), normals[v].end(), [](const Vec3& n) { return !(n.norm() > 0.5); });
-    const std::optional<Vec3> direction = is_flat ? std::nullopt : most_visible_direction(normals[v]);
-    if (!direction) {
-      rating.faults += goal == MendingGoal::layers;
-      least = 0;
-      continue;
-    }
-    for (const Vec3& n : normals[v]) least = std::min(least, direction->dot(n));
-  }
-  rating.is_hard = least < kEdgeOn;
-  return rating;
+  const auto& clearances = faults.clearances;
+  const auto num_hidden = static_cast<std::size_t>(std::count(clearances.begin(), clearances.end(), kHidden));
+  return {.faults = faults.meeting.size() + faults.num_flat + (goal == MendingGoal::layers ? num_hidden : 0),
+          .is_hard = std::any_of(clearances.begin(), clearances.end(), [](double c) { return c < kEdgeOn; }),
+          .distance = distance};
 }
 
 /// Mends one surface.
@@ -170,7 +216,15 @@ class LocalMender {
                      std::vector<Index>& seed_vertices) const;
   std::vector<Change> changes(const Patch& patch, const std::vector<Index>& vertices,
                               const std::vector<Index>& seed_vertices) const;
+  /// Makes the change at a fault that leaves the fewest; returns false if none helps.
   bool mend(const std::vector<Index>& seeds);
+  /// Returns true if `mend` found no change at a fault before, and nothing has changed around it since.
+  bool is_hopeless(const std::vector<Index>& seeds) const;
+  Eigen::AlignedBox3d box_of(Index t) const {
+    Eigen::AlignedBox3d box;
+    for (const Index v : mesh_.triangles[t]) box.extend(mesh_.positions[v]);
+    return box;
+  }
   void accept(const Patch& patch, const std::vector<Change>& changes, const std::vector<Index>& triangles,
               const std::vector<Index>& vertices);
 
@@ -182,6 +236,13 @@ class LocalMender {
   std::vector<std::vector<Index>> around_;  ///< triangles at each vertex
   std::vector<char> is_touched_;            ///< triangles that were changed in this round
   int num_pair_searches_ = 0;               ///< faults for which two changes at a time were tried
+  std::vector<Eigen::AlignedBox3d> changed_;  ///< boxes of the triangles that changed, before and after, in order
+  /// A fault that no change mended.
+  struct Failure {
+    Eigen::AlignedBox3d box;  ///< of the triangles that were looked at
+    std::size_t num_changed;  ///< size of `changed_` then
+  };
+  std::map<std::vector<Index>, Failure> failures_;  ///< by the triangles at the fault
   LocalMending done_;
 };
 
@@ -225,27 +286,21 @@ Patch LocalMender::patch_around(const std::vector<Index>& seeds, std::vector<Ind
   const std::set<Index> core(seeds.begin(), seeds.end()), first = corners_of(core),
                         second = corners_of(triangles_at(first)), ring = triangles_at(second);
   std::set<Index> chosen = ring;
-  const auto box_of = [&](Index t) {
-    Eigen::AlignedBox3d box;
-    for (const Index v : mesh_.triangles[t]) box.extend(mesh_.positions[v]);
-    return box;
-  };
   std::vector<Eigen::AlignedBox3d> boxes;
-  Eigen::AlignedBox3d whole;
+  Patch patch;
   for (const Index t : ring) {
     Eigen::AlignedBox3d box = box_of(t);
     const Vec3 margin = Vec3::Constant(2 * distance_);
     boxes.emplace_back(box.min() - margin, box.max() + margin);
-    whole.extend(boxes.back());
+    patch.box.extend(boxes.back());
   }
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
     if (done_.is_dropped[t]) continue;
     const Eigen::AlignedBox3d box = box_of(static_cast<Index>(t));
-    if (whole.intersects(box) &&
+    if (patch.box.intersects(box) &&
         std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) { return b.intersects(box); }))
       chosen.insert(static_cast<Index>(t));
   }
-  Patch patch;
   std::map<Index, Index> number;
   for (const Index t : chosen) {
     Corners corners = mesh_.triangles[t];
@@ -323,18 +378,24 @@ void LocalMender::accept(const Patch& patch, const std::vector<Change>& changes,
     done_.flipped_edges += change.kind == Change::Kind::flip;
     done_.moved_vertices += change.kind == Change::Kind::move;
   }
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    if (mesh_.positions[vertices[v]] == patch.mesh.positions[v]) continue;
-    mesh_.positions[vertices[v]] = patch.mesh.positions[v];
-    for (const Index t : around_[vertices[v]]) is_touched_[t] = 1;
-  }
+  std::set<Index> touched;
+  std::vector<std::pair<Index, Corners>> replaced;
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    if (mesh_.positions[vertices[v]] != patch.mesh.positions[v])
+      touched.insert(around_[vertices[v]].begin(), around_[vertices[v]].end());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    const Index t = triangles[i];
     Corners now = patch.mesh.triangles[i];
     if (now != kNone)
       for (Index& v : now) v = vertices[v];
-    if (now == mesh_.triangles[t]) continue;
+    if (now != mesh_.triangles[triangles[i]]) replaced.emplace_back(triangles[i], now);
+  }
+  for (const auto& [t, now] : replaced) touched.insert(t);
+  for (const Index t : touched) {
     is_touched_[t] = 1;
+    changed_.push_back(box_of(t));
+  }
+  for (std::size_t v = 0; v < vertices.size(); ++v) mesh_.positions[vertices[v]] = patch.mesh.positions[v];
+  for (const auto& [t, now] : replaced) {
     for (const Index v : mesh_.triangles[t]) std::erase(around_[v], t);
     if (now == kNone) {
       done_.is_dropped[t] = 1;
@@ -343,21 +404,34 @@ void LocalMender::accept(const Patch& patch, const std::vector<Change>& changes,
     mesh_.triangles[t] = now;
     for (const Index v : now) around_[v].push_back(t);
   }
+  for (const Index t : touched)
+    if (!done_.is_dropped[t]) changed_.push_back(box_of(t));
+}
+
+bool LocalMender::is_hopeless(const std::vector<Index>& seeds) const {
+  const auto found = failures_.find(seeds);
+  if (found == failures_.end()) return false;
+  const Failure& failure = found->second;
+  return std::none_of(changed_.begin() + static_cast<std::ptrdiff_t>(failure.num_changed), changed_.end(),
+                      [&](const Eigen::AlignedBox3d& box) { return box.intersects(failure.box); });
 }
 
 bool LocalMender::mend(const std::vector<Index>& seeds) {
   constexpr std::size_t kBest = 6;       // first changes for which a second one is tried
   constexpr int kMostPairSearches = 20;  // each takes up to a second on large patches
+  if (is_hopeless(seeds)) return false;
   std::vector<Index> triangles, vertices, seed_vertices;
   const Patch patch = patch_around(seeds, triangles, vertices, seed_vertices);
-  const Rating before = rating_of(patch, 0, goal_);
+  const PatchFaults given_faults = faults_of(patch);
+  const Rating before = rating_of(given_faults, 0, goal_);
   struct Trial {
     Rating rating;
+    PatchFaults faults;
     Patch patch;
     std::vector<Change> changes;
   };
   std::vector<Trial> trials;
-  const auto try_all = [&](const Patch& from, const std::vector<Change>& first) {
+  const auto try_all = [&](const Patch& from, const PatchFaults& known, const std::vector<Change>& first) {
     for (const Change& change : changes(from, vertices, seed_vertices)) {
       if (is_cancelled()) return;
       Patch changed = from;
@@ -366,23 +440,28 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
       all.push_back(change);
       double distance = 0;
       for (const Change& one : all) distance += one.distance;
-      const Rating rating = rating_of(changed, distance, goal_);
-      trials.push_back({rating, std::move(changed), std::move(all)});
+      PatchFaults faults = faults_of(changed, &from, &known);
+      const Rating rating = rating_of(faults, distance, goal_);
+      trials.push_back({rating, std::move(faults), std::move(changed), std::move(all)});
     }
   };
   const auto best = [&] {
     return std::min_element(trials.begin(), trials.end(),
                             [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
   };
-  try_all(patch, {});
-  if (trials.empty() || is_cancelled()) return false;
-  if (best()->rating.faults >= before.faults && num_pair_searches_++ < kMostPairSearches) {
+  try_all(patch, given_faults, {});
+  if (is_cancelled()) return false;
+  if (!trials.empty() && best()->rating.faults >= before.faults && num_pair_searches_++ < kMostPairSearches) {
     std::stable_sort(trials.begin(), trials.end(),
                      [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
     const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
-    for (const Trial& trial : first) try_all(trial.patch, trial.changes);
+    for (const Trial& trial : first) try_all(trial.patch, trial.faults, trial.changes);
   }
-  if (is_cancelled() || best()->rating.faults >= before.faults) return false;
+  if (is_cancelled()) return false;
+  if (trials.empty() || best()->rating.faults >= before.faults) {
+    failures_[seeds] = {patch.box, changed_.size()};
+    return false;
+  }
   const Trial& chosen = *best();
   accept(chosen.patch, chosen.changes, triangles, vertices);
   return true;

@@ -34,7 +34,7 @@ constexpr NamedType kPlyTypes[] = {
     {"float64", kFloat64}};
 
 struct Property {
-  enum class Use { none, x, y, z, corners, attribute, label, red, green, blue };
+  enum class Use { none, x, y, z, corners, strip, attribute, label, red, green, blue };
   Use use = Use::none;
   std::string name;
   bool is_list = false;
@@ -51,6 +51,7 @@ struct PlyElement {
     for (const Property& p : properties) bytes += text ? 2 : p.is_list ? p.count_type.size : p.type.size;
     return bytes;
   }
+  bool holds_faces() const { return name == "face" || name == "tristrips"; }
   bool has(Property::Use use) const {
     return std::any_of(properties.begin(), properties.end(), [&](const Property& p) { return p.use == use; });
   }
@@ -82,7 +83,7 @@ class PlyParser {
   bool has_faces() {
     read_header();
     return std::any_of(elements_.begin(), elements_.end(),
-                       [](const PlyElement& element) { return element.name == "face" && element.count > 0; });
+                       [](const PlyElement& element) { return element.holds_faces() && element.count > 0; });
   }
 
   /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
@@ -155,6 +156,9 @@ class PlyParser {
   /// Chooses the properties of faces that become groups: the one whose name tells most of a material or a region, else
   /// a color. Counts all properties that are not used.
   void choose_face_properties() {
+    if (std::count_if(elements_.begin(), elements_.end(),
+                      [](const PlyElement& e) { return e.holds_faces() && e.count > 0; }) > 1)
+      scan_.fail("more than one element of faces or tristrips; expected one");
     for (PlyElement& element : elements_) {
       if (element.name == "face") choose_groups(element);
       for (const Property& property : element.properties) note(element, property);
@@ -231,7 +235,10 @@ class PlyParser {
       if (!attribute_.empty() && name == attribute_) return Property::Use::attribute;
     }
     const bool corners = name == "vertex_indices" || name == "vertex_index";
-    return element == "face" && is_list && corners ? Property::Use::corners : Property::Use::none;
+    if (!is_list || !corners) return Property::Use::none;
+    return element == "face"        ? Property::Use::corners
+           : element == "tristrips" ? Property::Use::strip
+                                    : Property::Use::none;
   }
 
   void read_element(const PlyElement& element) {
@@ -239,6 +246,7 @@ class PlyParser {
     if (vertices && !(element.has(Property::Use::x) && element.has(Property::Use::y) && element.has(Property::Use::z)))
       fail("vertices without x, y and z");
     if (faces && !element.has(Property::Use::corners)) fail("faces without vertex_indices");
+    if (element.name == "tristrips" && !element.has(Property::Use::strip)) fail("tristrips without vertex_indices");
     // An element without properties takes no bytes, so its count means nothing.
     if (element.properties.empty()) return;
     if (element.count > (scan_.bytes_left() + 1) / element.least_bytes(text_))
@@ -261,9 +269,12 @@ class PlyParser {
     if (property.is_list) {
       const double n = read_whole(property.count_type, "the length of a list");
       if (n < 0 || n > static_cast<double>(scan_.bytes_left())) fail("a list of impossible length");
+      strip_.clear();
       for (double i = 0; i < n; ++i) {
         if (property.use == Use::corners)
           add_corner(read_whole(property.type, "a vertex number"));
+        else if (property.use == Use::strip)
+          add_to_strip(read_whole(property.type, "a vertex number"));
         else
           skip_value(property.type);
       }
@@ -287,6 +298,21 @@ class PlyParser {
   void add_corner(double v) {
     if (v < 0 || v > std::numeric_limits<Index>::max()) fail("vertex number out of range");
     mesh_.face_vertices.push_back(static_cast<Index>(v));
+  }
+
+  /// Adds the triangle of the last three vertices of a strip; every second one is turned. A vertex -1 ends a strip, and
+  /// triangles that name a vertex twice only join strips.
+  void add_to_strip(double v) {
+    if (v == -1) return strip_.clear();
+    if (v < 0 || v > std::numeric_limits<Index>::max()) fail("vertex number out of range");
+    strip_.push_back(static_cast<Index>(v));
+    if (strip_.size() < 3) return;
+    std::array<Index, 3> corners{};
+    std::copy(strip_.end() - 3, strip_.end(), corners.begin());
+    if (strip_.size() % 2 == 0) std::swap(corners[0], corners[1]);
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) return;
+    mesh_.face_vertices.insert(mesh_.face_vertices.end(), corners.begin(), corners.end());
+    mesh_.face_offsets.push_back(mesh_.face_vertices.size());
   }
 
   double read_whole(ValueType type, const char* what) {
@@ -321,6 +347,7 @@ class PlyParser {
   std::vector<PlyElement> elements_;
   LeftOut left_out_;
   PolygonMesh mesh_;
+  std::vector<Index> strip_;  // vertices of the present strip of triangles
   std::string attribute_;
   std::vector<double> values_;
   std::string label_name_;

@@ -340,6 +340,28 @@ TEST_CASE("what is malformed in an STL file is refused with its line or byte") {
   CHECK_THAT(surface_refusal("a.stl", bytes), Contains("byte 96") && Contains("not finite"));
 }
 
+TEST_CASE("strips of triangles in PLY become triangles with their orientation") {
+  const auto with_strips = [](const std::string& strips, int count) {
+    return "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+           "element face 0\nproperty list uchar int vertex_indices\nelement tristrips " +
+           std::to_string(count) + "\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" +
+           strips;
+  };
+  const std::vector<std::array<Index, 3>> outward{{0, 2, 1}, {1, 2, 3}, {1, 3, 0}, {0, 3, 2}};
+  for (const auto& [strips, count] :
+       {std::pair("6 0 2 1 3 0 2\n", 1), std::pair("9 0 2 1 3 -1 1 3 0 2\n", 1), std::pair("4 0 2 1 3\n4 1 3 0 2\n", 2),
+        std::pair("10 0 2 1 3 3 1 1 3 0 2\n", 1)}) {
+    CAPTURE(strips);
+    const TriangleMesh mesh = read_triangles("a.ply", with_strips(strips, count));
+    CHECK(mesh.positions.size() == 4);
+    CHECK(mesh.triangles == outward);
+  }
+  CHECK_THAT(surface_refusal("a.ply", with_strips("3 0 2 7\n", 1)), Contains("vertex 7 of 4"));
+  CHECK_THAT(surface_refusal("a.ply", with_strips("3 0 2 -2\n", 1)), Contains("out of range"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(with_strips("3 0 2 1\n", 1), "face 0", "face 1")),
+             Contains("more than one element"));
+}
+
 TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
   CHECK_THAT(surface_refusal("a.ply", ""), Contains(":1:"));
   CHECK_THAT(surface_refusal("a.ply", "ply\nelement vertex 1\nend_header\n"), Contains("no format"));
