@@ -2,6 +2,7 @@
 #include "subvol/fit/features/joined_curves.h"
 
 #include "subvol/fit/features/polyline.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <algorithm>
 #include <optional>
@@ -13,38 +14,36 @@ namespace subvol::internal {
 
 namespace {
 
-/// A path that another one joins, and how far from the corner, as a share of its length.
+/// The path of a curve that another path joins.
 struct Junction {
   Index curve;
-  bool at_front;
-  double share;
+  bool at_front;  ///< nearer to the path's first vertex than to its last
 };
 
-std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting& routing, Index joined, Index vertex) {
+std::optional<Junction> junction_at(const FeatureRouting& routing, Index joined, Index vertex) {
   for (const CreasePath& path : routing.paths) {
     if (path.curve == joined) continue;
     const auto at = std::ranges::find(path.vertices, vertex);
     if (at == path.vertices.begin() || at == path.vertices.end()) continue;
     if (at + 1 == path.vertices.end()) continue;  // another path that joins there
-    std::vector<Vec3> points;
-    for (Index v : path.vertices) points.push_back(mesh.positions[v]);
-    const double length = polyline_length(points);
-    const double before = polyline_length(std::span(points).first(at - path.vertices.begin() + 1));
     // A path joins another one in the first half, seen from their corner.
-    const bool at_front = 2 * (at - path.vertices.begin()) < std::ssize(path.vertices);
-    const double share = length > 0 ? before / length : 0;
-    return Junction{path.curve, at_front, at_front ? share : 1 - share};
+    return Junction{path.curve, 2 * (at - path.vertices.begin()) < std::ssize(path.vertices)};
   }
   return std::nullopt;
 }
 
-/// Replaces the beginning of a curve, as far as the junction lies from the corner, by the junction.
-void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Junction& junction) {
+/// Lets a curve begin where another one is closest to the vertex at which its path joins that one's, with a line to the
+/// place on itself that is as far from their corner.
+void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, bool at_front, const Vec3& vertex) {
   const ArcLength arc(other.points), own(curve.points);
-  const double before = junction.share * arc.length();
+  std::vector<Vec3> half = at_front ? arc.part(0, arc.length() / 2) : arc.part(arc.length() / 2, arc.length());
+  if (!at_front) std::reverse(half.begin(), half.end());
+  const ClosestPoint::Hit junction = polyline_tree(half).closest(vertex);
+  const auto first = static_cast<std::size_t>(junction.triangle);
+  const double before = polyline_length(std::span(half).first(first + 1)) + (junction.point - half[first]).norm();
   const double most = 0.5 * own.length();  // the rest must not vanish
   std::vector<Vec3> points = own.part(std::min(before, most), own.length());
-  points.front() = arc.at(junction.at_front ? before : arc.length() - before);
+  if (junction.point != points.front()) points.insert(points.begin(), junction.point);
   curve.points = std::move(points);
 }
 
@@ -76,10 +75,10 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
       const Index vertex = end == 0 ? path->vertices.front() : path->vertices.back();
       const Index corner = end == 0 ? curve.vertices.front() : curve.vertices.back();
       const bool at_corner = std::ranges::find(routing.corners, PlacedCorner{corner, vertex}) != routing.corners.end();
-      const auto junction = at_corner ? std::nullopt : junction_at(mesh, routing, c, vertex);
+      const auto junction = at_corner ? std::nullopt : junction_at(routing, c, vertex);
       if (!junction) continue;
       if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
-      start_at_junction(curve, features.curves.curves[junction->curve], *junction);
+      start_at_junction(curve, features.curves.curves[junction->curve], junction->at_front, mesh.positions[vertex]);
       if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
     }
     number_vertices(curve);
