@@ -47,6 +47,11 @@ class FlatBorders {
  private:
   std::vector<Run> loops() const;
   std::vector<Run> pieces_of(const Run& loop) const;
+  std::optional<BorderPlane> plane_around(std::size_t first, const std::vector<Run>& pieces,
+                                          std::vector<char>& is_taken) const;
+  /// Returns the number of straight stretches of a piece.
+  std::size_t num_stretches(const Run& piece) const;
+  bool is_near(const BorderPlane& plane, const Run& piece) const;
   std::optional<BorderPlane> plane_of_run(const Run& run) const;
   Index from(Index corner) const { return topology_.corner_vertices[corner]; }
   Index to(Index corner) const { return topology_.corner_vertices[topology_.next(corner)]; }
@@ -112,6 +117,55 @@ std::optional<BorderPlane> FlatBorders::plane_of_run(const Run& run) const {
   return plane;
 }
 
+std::size_t FlatBorders::num_stretches(const Run& piece) const {
+  constexpr double kStraight = 1e-2;  // sine of the largest turn in a straight stretch
+  std::size_t count = 1;
+  Vec3 start = way(piece.front());
+  for (const Index h : piece) {
+    if (start.cross(way(h)).norm() <= kStraight) continue;
+    start = way(h);
+    ++count;
+  }
+  return count;
+}
+
+bool FlatBorders::is_near(const BorderPlane& plane, const Run& piece) const {
+  const Vec3& origin = positions_[plane.vertices.front()];
+  return std::all_of(piece.begin(), piece.end(), [&](Index h) {
+    return std::abs(plane.normal.dot(positions_[from(h)] - origin)) <= 2 * tolerance_ &&
+           std::abs(plane.normal.dot(positions_[to(h)] - origin)) <= 2 * tolerance_;
+  });
+}
+
+/// Returns the plane of a piece of a loop and its neighbors, as far as they are in one, and marks them as taken.
+std::optional<BorderPlane> FlatBorders::plane_around(std::size_t first, const std::vector<Run>& pieces,
+                                                     std::vector<char>& is_taken) const {
+  constexpr std::size_t kLeastStretches = 3;  // two straight ones lie in a plane in any case
+  Run run = pieces[first];
+  std::optional<BorderPlane> plane = plane_of_run(run);
+  std::vector<std::size_t> members{first};
+  is_taken[first] = 1;
+  std::size_t stretches = num_stretches(run);
+  // A straight piece has a plane only together with its neighbors.
+  for (const std::size_t step : {std::size_t{1}, pieces.size() - 1})
+    for (std::size_t next = (first + step) % pieces.size(); !is_taken[next]; next = (next + step) % pieces.size()) {
+      if (plane && !is_near(*plane, pieces[next])) break;
+      run.insert(run.end(), pieces[next].begin(), pieces[next].end());
+      if (!plane) plane = plane_of_run(run);
+      if (!plane) {
+        run.resize(run.size() - pieces[next].size());
+        break;
+      }
+      members.push_back(next);
+      is_taken[next] = 1;
+      stretches += num_stretches(pieces[next]);
+    }
+  if (members.size() > 1) plane = plane_of_run(run);  // of all of them
+  if (plane && stretches >= kLeastStretches) return plane;
+  for (const std::size_t member : members) is_taken[member] = 0;
+  return std::nullopt;
+}
+
 std::vector<BorderPlane> FlatBorders::find() {
   std::vector<BorderPlane> planes;
   for (const Run& loop : loops()) {
@@ -121,27 +175,10 @@ std::vector<BorderPlane> FlatBorders::find() {
     }
     const std::vector<Run> pieces = pieces_of(loop);
     std::vector<char> is_taken(pieces.size(), 0);
-    for (std::size_t first = 0; first < pieces.size(); ++first) {
-      if (is_taken[first]) continue;
-      // A straight piece has a plane only together with its neighbors.
-      Run run = pieces[first];
-      std::optional<BorderPlane> plane = plane_of_run(run);
-      std::vector<std::size_t> members{first};
-      for (const std::size_t step : {std::size_t{1}, pieces.size() - 1})
-        for (std::size_t next = (first + step) % pieces.size(); next != first && !is_taken[next];
-             next = (next + step) % pieces.size()) {
-          Run longer = run;
-          longer.insert(longer.end(), pieces[next].begin(), pieces[next].end());
-          std::optional<BorderPlane> common = plane_of_run(longer);
-          if (!common || std::find(members.begin(), members.end(), next) != members.end()) break;
-          run = std::move(longer);
-          plane = std::move(common);
-          members.push_back(next);
-        }
-      if (!plane) continue;
-      for (const std::size_t member : members) is_taken[member] = 1;
-      planes.push_back(std::move(*plane));
-    }
+    for (std::size_t first = 0; first < pieces.size(); ++first)
+      if (!is_taken[first])
+        if (std::optional<BorderPlane> plane = plane_around(first, pieces, is_taken))
+          planes.push_back(std::move(*plane));
   }
   return planes;
 }

@@ -23,8 +23,8 @@ struct BorderPlane {
 inline constexpr double kFlatShare = 1e-6;
 
 /// Finds the flat parts of a surface's border: a loop of border edges in one plane; of other loops, neighboring pieces
-/// between turns of more than 30 degrees that are in one plane. A straight piece alone lies in many planes and has
-/// none. Planes in which faces at the border lie themselves, within 18 degrees, do not count.
+/// between turns of more than 30 degrees that are in one plane. One or two straight stretches lie in a plane in any
+/// case, and have none. Planes in which faces at the border lie themselves, within 18 degrees, do not count.
 std::vector<BorderPlane> flat_border_planes(const PolygonMesh& surface, const SurfaceTopology& topology);
 
 /// The planes of each column of a shell.

@@ -11,6 +11,7 @@
 #include "subvol/shell/shell_check.h"
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -18,6 +19,8 @@ namespace subvol {
 
 using namespace internal;
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr int kLeastIntervals = 4;
 /// Share of the work that is done when the straight shell is there.
@@ -74,9 +77,11 @@ class CurvedShellCheck {
   CurvedShellCheck(const ShellLayers& layers, const ElementSpace& space, const CurvedShellOptions& options)
       : layers_(layers), space_(space), make_boundary_(options.boundary ? options.boundary : uniform_boundary) {}
 
-  std::vector<std::array<Index, 2>> intersecting_faces(std::span<const Vec3> nodes) const {
+  /// ended  may end the search early. Empty: never.
+  std::vector<std::array<Index, 2>> intersecting_faces(std::span<const Vec3> nodes,
+                                                       const std::function<bool()>& ended = {}) const {
     const CurvedBoundary boundary = make_boundary_({space_, {nodes.begin(), nodes.end()}});
-    const SelfIntersections found = self_intersections(boundary.triangles);
+    const SelfIntersections found = self_intersections(boundary.triangles, ended);
     std::vector<std::array<Index, 2>> pairs;
     const auto add = [&](Index t, Index s) {
       const auto [f, g] = std::minmax(boundary.faces[t], boundary.faces[s]);
@@ -89,7 +94,7 @@ class CurvedShellCheck {
     return pairs;
   }
 
-  std::vector<Index> failing_strands(std::span<const Vec3> nodes) const {
+  std::vector<Index> failing_strands(std::span<const Vec3> nodes, const std::function<bool()>& ended) const {
     std::vector<Index> strands;
     const auto add = [&](std::span<const Index> vertices) {
       for (const Index v : vertices)
@@ -97,7 +102,7 @@ class CurvedShellCheck {
     };
     for (const Index c : certify(space_, nodes).not_certified) add(space_.vertices(c));
     const MeshTopology& topology = space_.topology();
-    for (const auto& pair : intersecting_faces(nodes))
+    for (const auto& pair : intersecting_faces(nodes, ended))
       for (const Index place : pair) add(topology.face(topology.boundary_faces()[place]));
     std::sort(strands.begin(), strands.end());
     strands.erase(std::unique(strands.begin(), strands.end()), strands.end());
@@ -216,16 +221,27 @@ CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unch
   const ElementSpace& space = curved.mesh.space;
   const NodeStrands strands = node_strands(shell.layers, space);
   const std::vector<Vec3> straight = curved.mesh.coefficients;
+  const auto begin = Clock::now();
+  const auto is_late = [&] {
+    return options.time_limit_seconds > 0 &&
+           std::chrono::duration<double>(Clock::now() - begin).count() > options.time_limit_seconds;
+  };
+  const auto ended = [&] { return (options.cancelled && options.cancelled()) || is_late(); };
   solve(shell, options, strands, curved.mesh, curved.report);
 
   const CurvedShellCheck check(shell.layers, space, options);
   std::vector<double> shares;
   curved.mesh.coefficients = advance(
-      shell.layers, strands, [&](std::span<const Vec3> nodes) { return check.failing_strands(nodes); }, straight,
-      curved.mesh.coefficients, &shares);
-  if (const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; }); held > 0)
+      shell.layers, strands, [&](std::span<const Vec3> nodes) { return check.failing_strands(nodes, ended); }, straight,
+      curved.mesh.coefficients, ended, &shares);
+  const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; });
+  if (held > 0 && ended()) {
+    curved.report.stop_reason = is_late() ? StopReason::time_limit : StopReason::cancelled;
+    curved.report.explanation = "ended before the curved cells were checked; they are straight";
+  } else if (held > 0) {
     curved.report.warnings.push_back(std::to_string(held) + " columns are curved less than the solve had them: there "
                                      "faces met or cells were not certified");
+  }
   curved.quality = measure_quality(curved.mesh, 0, shell_reference(shell.layers, shell.limited));
   curved.intersecting_faces = check.intersecting_faces(curved.mesh.coefficients);
   curved.thickness = measure_thickness(shell.layers, std::span(curved.mesh.coefficients).first(space.num_vertices()));

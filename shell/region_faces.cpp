@@ -17,13 +17,13 @@ namespace {
 using Point = std::array<double, 3>;
 using Corners = std::array<Point, 3>;
 
+/// A position without negative zeros.
+Point point_of(const Vec3& p) { return {p.x() + 0.0, p.y() + 0.0, p.z() + 0.0}; }
+
 /// The positions of a triangle's corners, so that the same triangle is found among others by its place.
 Corners corners_of(const TriangleMesh& mesh, std::size_t triangle) {
   Corners corners;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3& p = mesh.positions[mesh.triangles[triangle][i]];
-    corners[i] = {p.x() + 0.0, p.y() + 0.0, p.z() + 0.0};  // no negative zero
-  }
+  for (std::size_t i = 0; i < 3; ++i) corners[i] = point_of(mesh.positions[mesh.triangles[triangle][i]]);
   return corners;
 }
 
@@ -46,6 +46,28 @@ struct Found {
   bool is_taken = false;
 };
 
+/// Joins vertices at one position if they lie on open edges of the faces that are left.
+void close_rims(RegionFaces& faces) {
+  PolygonMesh& surface = faces.surface;
+  std::map<std::array<Index, 2>, std::size_t> num_faces;  // by edge
+  const auto for_each_corner = [&](const auto& visit) {
+    for (std::size_t f = 0; f < surface.num_faces(); ++f)
+      for (std::size_t h = surface.face_offsets[f]; !faces.is_left_out[f] && h < surface.face_offsets[f + 1]; ++h)
+        visit(surface.face_vertices[h],
+              surface.face_vertices[h + 1 < surface.face_offsets[f + 1] ? h + 1 : surface.face_offsets[f]]);
+  };
+  for_each_corner([&](Index a, Index b) { ++num_faces[{std::min(a, b), std::max(a, b)}]; });
+  std::map<Point, Index> first;
+  std::map<Index, Index> joined;
+  for (const auto& [edge, count] : num_faces)
+    if (count == 1)
+      for (const Index v : edge) joined[v] = first.try_emplace(point_of(surface.positions[v]), v).first->second;
+  if (joined.empty()) return;
+  for_each_corner([&](Index& v, Index) {
+    if (const auto at = joined.find(v); at != joined.end()) v = at->second;
+  });
+}
+
 }  // namespace
 
 RegionFaces faces_of_region(const PolygonMesh& surface, const RegionSurface& regions, int region) {
@@ -64,12 +86,13 @@ RegionFaces faces_of_region(const PolygonMesh& surface, const RegionSurface& reg
     Corners corners = corners_of(triangles, t);
     const bool is_turned = sort_corners(corners);
     const auto at = by_place.find(corners);
-    if (at == by_place.end() || is_seen[face]) continue;
+    if (at == by_place.end()) continue;
     Found& found = at->second;
-    is_seen[face] = 1;
+    const bool is_taken = std::exchange(found.is_taken, true);
+    if (std::exchange(is_seen[face], 1)) continue;  // the first triangle with an area decides
     const auto& [behind, front] = regions.sides[found.triangle];
     const bool bounds = region == kOutside ? front == kOutside : behind == region || front == region;
-    if (!bounds || std::exchange(found.is_taken, true)) continue;
+    if (!bounds || is_taken) continue;
     result.is_left_out[face] = 0;
     const bool is_outward = region == kOutside || behind == region;  // the triangle of the regions
     if (is_outward == (is_turned == found.is_turned)) continue;
@@ -77,6 +100,7 @@ RegionFaces faces_of_region(const PolygonMesh& surface, const RegionSurface& reg
     std::reverse(first + static_cast<std::ptrdiff_t>(surface.face_offsets[face]) + 1,
                  first + static_cast<std::ptrdiff_t>(surface.face_offsets[face + 1]));
   }
+  close_rims(result);
   result.num_left_out = static_cast<std::size_t>(std::ranges::count(result.is_left_out, 1));
   return result;
 }

@@ -32,6 +32,8 @@ void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   if (options.layers < 1) throw InputError("shell: layers must be at least 1, got " + std::to_string(options.layers));
   if (!positive(options.growth)) throw InputError("shell: growth must be positive");
+  if (options.max_iterations < 0 || !(options.time_limit_seconds >= 0))
+    throw InputError("shell: limits of a solve must not be negative");
   if (options.vertex_thickness.empty()) {
     if (!positive(options.thickness)) throw InputError("shell: thickness must be positive");
     return;
@@ -76,7 +78,7 @@ class ShellMaker {
   ShellResult run(const PolygonMesh& surface);
 
  private:
-  void require_no_faults(const PolygonMesh& surface) const;
+  void require_no_faults() const;
   void find_planes();
   void find_directions();
   void find_thickness();
@@ -92,6 +94,13 @@ class ShellMaker {
   bool tell(const char* stage, int iteration, double energy, double fraction);
   /// Checks only for cancellation and the time limit; `wanted` is the callback's last answer.
   bool goes_on(bool wanted);
+  /// Returns true if the caller or the time limit wants the run to end.
+  bool is_to_end() const {
+    return ended_ || (options_.cancelled && options_.cancelled()) ||
+           (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds);
+  }
+  /// Does a part of the work before there is a shell; not if the caller's `cancelled` ends the run.
+  void begin_with(const char* part, double fraction, void (ShellMaker::*work)());
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   void timed(const char* part, void (ShellMaker::*work)());
   /// Names vertices of the surface with their given coordinates.
@@ -148,9 +157,14 @@ void ShellMaker::timed(const char* part, void (ShellMaker::*work)()) {
   report_.seconds.emplace_back(part, seconds() - before);
 }
 
-void ShellMaker::require_no_faults(const PolygonMesh& surface) const {
-  const SurfaceFaults faults = find_faults(surface, MendingGoal::layers, options_.cancelled);
-  const std::string text = to_text(faults, surface, {options_.vertex_numbers, options_.face_numbers});
+void ShellMaker::begin_with(const char* part, double fraction, void (ShellMaker::*work)()) {
+  tell(part, 0, 0, fraction);
+  if (!options_.cancelled || !options_.cancelled()) timed(part, work);
+}
+
+void ShellMaker::require_no_faults() const {
+  const SurfaceFaults faults = find_faults(given_, MendingGoal::layers, options_.cancelled);
+  const std::string text = to_text(faults, given_, {options_.vertex_numbers, options_.face_numbers});
   if (!text.empty()) throw InputError(text);
 }
 
@@ -168,6 +182,7 @@ void ShellMaker::find_planes() {
 }
 
 void ShellMaker::find_directions() {
+  require_no_faults();
   directions_ = visible_normals(layers_.surface).directions;
   find_planes();
   if (!layers_.planes.empty()) turn_into_planes(layers_, directions_);
@@ -191,8 +206,10 @@ void ShellMaker::start() {
     goes_on(true);
     return;
   }
-  start_ = advance(layers_, check_, thin, straight_columns(layers_, directions_, thickness_));
+  start_ = advance(layers_, check_, thin, straight_columns(layers_, directions_, thickness_),
+                   [this] { return is_to_end(); });
   positions_ = start_;
+  goes_on(true);
 }
 
 /// Returns for each vertex 1 if it is fixed, else 0.
@@ -276,10 +293,7 @@ MinimizerStop ShellMaker::solve(int round) {
   int iteration = 0;
   MinimizerOptions minimizer;
   minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultShellIterations;
-  minimizer.ended = [&] {
-    return (options_.cancelled && options_.cancelled()) ||
-           (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds);
-  };
+  minimizer.ended = [this] { return is_to_end(); };
   minimizer.progress = [&](const IterationRecord& record) {
     ++iteration;
     const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
@@ -304,7 +318,7 @@ void ShellMaker::optimize() {
   for (int round = 0; round < kMaxRounds && !apart && !ended_; ++round) {
     const MinimizerStop stop = solve(round);
     if (stop == MinimizerStop::cancelled) break;
-    const ShellFailures failures = check_.failures(positions_);
+    const ShellFailures failures = check_.failures(positions_, [this] { return is_to_end(); });
     apart = failures.none();
     if (apart && report_.explanation.empty()) {
       report_.explanation = report_.stages.back().stop;
@@ -316,7 +330,9 @@ void ShellMaker::optimize() {
   }
   if (apart) return;
   std::vector<double> shares;
-  positions_ = advance(layers_, check_, start_, positions_, &shares);
+  positions_ = advance(
+      layers_, check_, start_, positions_, [this] { return is_to_end(); }, &shares);
+  goes_on(true);
   const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; });
   if (held > 0)
     report_.warnings.push_back(std::to_string(held) +
@@ -328,13 +344,9 @@ void ShellMaker::optimize() {
 
 ShellResult ShellMaker::run(const PolygonMesh& surface) {
   cells_.tags = shell_tags(layers_, options_.tags);
-  tell("directions", 0, 0, 0);
-  require_no_faults(surface);
-  timed("directions", &ShellMaker::find_directions);
-  tell("thickness", 0, 0, 0.02);
-  timed("thickness", &ShellMaker::find_thickness);
-  tell("start", 0, 0, 0.04);
-  timed("start", &ShellMaker::start);
+  begin_with("directions", 0, &ShellMaker::find_directions);
+  begin_with("thickness", 0.02, &ShellMaker::find_thickness);
+  begin_with("start", 0.04, &ShellMaker::start);
   ShellResult result;
   if (positions_.empty()) {
     result.report = std::move(report_);
@@ -342,7 +354,7 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
   }
   if (options_.free_surface) target_.emplace(triangulate(layers_.surface));
   if (options_.optimize && !ended_) timed("solve", &ShellMaker::optimize);
-  if (!options_.optimize) report_.explanation = "straight columns, no solve";
+  if (!options_.optimize && !ended_) report_.explanation = "straight columns, no solve";
   finish(surface, result);
   return result;
 }

@@ -99,13 +99,20 @@ NodeStrands vertex_strands(const ShellLayers& layers) {
 }
 
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
-                          std::span<const Vec3> safe, std::span<const Vec3> wanted, std::vector<double>* shares_out) {
+                          std::span<const Vec3> safe, std::span<const Vec3> wanted, const std::function<bool()>& ended,
+                          std::vector<double>* shares_out) {
   constexpr double kShrink = 0.7, kLeast = 0.05;
   std::vector<double> shares(layers.num_strands(), 1.0);
   std::vector<Vec3> state(wanted.begin(), wanted.end());
   for (;;) {
     bool moved = false;
-    for (const Index strand : failing(state)) {
+    const std::vector<Index> held = failing(state);
+    if (ended && ended()) {
+      shares.assign(shares.size(), 0);
+      state.assign(safe.begin(), safe.end());
+      break;
+    }
+    for (const Index strand : held) {
       double& share = shares[strand];
       moved = moved || share > 0;
       share = kShrink * share < kLeast ? 0 : kShrink * share;
@@ -123,9 +130,10 @@ std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, c
 }
 
 std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
-                          std::span<const Vec3> wanted, std::vector<double>* shares) {
-  const auto failing = [&](std::span<const Vec3> positions) { return check.strands(check.failures(positions)); };
-  return advance(layers, vertex_strands(layers), failing, safe, wanted, shares);
+                          std::span<const Vec3> wanted, const std::function<bool()>& ended,
+                          std::vector<double>* shares) {
+  const auto failing = [&](std::span<const Vec3> positions) { return check.strands(check.failures(positions, ended)); };
+  return advance(layers, vertex_strands(layers), failing, safe, wanted, ended, shares);
 }
 
 }  // namespace subvol

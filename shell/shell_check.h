@@ -73,12 +73,14 @@ using FailingStrands = std::function<std::vector<Index>(std::span<const Vec3> no
 /// of its strands.
 ///
 /// safe    a valid state; otherwise the result may be invalid.
+/// ended   asked after each check; if it returns true, the safe state is the result. Empty: never.
 /// shares  if not null, receives each strand's share, 0 .. 1.
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted,
-                          std::vector<double>* shares = nullptr);
+                          const std::function<bool()>& ended = {}, std::vector<double>* shares = nullptr);
 /// `advance` for linear cells.
 std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
-                          std::span<const Vec3> wanted, std::vector<double>* shares = nullptr);
+                          std::span<const Vec3> wanted, const std::function<bool()>& ended = {},
+                          std::vector<double>* shares = nullptr);
 
 }  // namespace subvol

@@ -71,6 +71,21 @@ TEST_CASE("Pieces of a border have planes if they are not straight, or together 
   CHECK(channel.num_columns() == 2 * 13);
 }
 
+TEST_CASE("A border that zigzags has no planes, although each two of its edges lie in one", "[shell]") {
+  constexpr int kEdges = 12;
+  const PolygonMesh tube = grid(
+      kEdges, 1, Faces::quads,
+      [](double i, double j) {
+        const double angle = 2 * std::numbers::pi * i / kEdges, bump = static_cast<int>(i) % 2 == 0 ? 0.4 : -0.4;
+        return Vec3(std::cos(angle), std::sin(angle), j > 0 ? 2 + bump : 0);
+      },
+      true);
+  const ShellLayers layers = make_layers(tube, 0, 1, 1);
+  const std::vector<BorderPlane> planes = flat_border_planes(tube, layers.topology);
+  REQUIRE(planes.size() == 1);
+  CHECK(std::abs(planes[0].normal.z()) == Approx(1));
+}
+
 TEST_CASE("Projectors keep points in planes, on lines, or free", "[shell]") {
   const ColumnPlanes planes({{Vec3::UnitX(), {0, 1}}, {Vec3::UnitY(), {1, 2}}}, 4);
   const auto of = [&](std::initializer_list<Index> columns) { return planes.projector(std::vector<Index>(columns)); };

@@ -7,6 +7,10 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <map>
+#include <utility>
+
 using namespace subvol;
 using namespace subvol::internal;
 
@@ -54,4 +58,38 @@ TEST_CASE("of two faces in one place, a region has one", "[shell][regions]") {
     CHECK(enclosed_volume(faces.surface, faces.is_left_out) == Approx(1));
   }
   CHECK(!has_inner_sheets(as_polygons(test::ball_surface({0, 0, 0}, 1, 4))));
+}
+
+TEST_CASE("of two quads in one place, a region has one that its others share vertices with", "[shell][regions]") {
+  // Two cubes, each with its own quad between them; the second one's starts at each of its corners in turn.
+  PolygonMesh one;
+  for (int v = 0; v < 8; ++v) one.positions.push_back(Vec3(v & 1, (v >> 1) & 1, (v >> 2) & 1));
+  one.face_vertices = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
+  one.face_offsets = {0, 4, 8, 12, 16, 20, 24};
+  for (std::size_t turn = 0; turn < 4; ++turn) {
+    CAPTURE(turn);
+    PolygonMesh two;
+    for (int cube = 0; cube < 2; ++cube) {
+      const auto first = static_cast<Index>(two.positions.size());
+      for (const Vec3& p : one.positions) two.positions.push_back(p + Vec3(cube, 0, 0));
+      for (std::size_t f = 0; f < one.num_faces(); ++f) {
+        for (std::size_t k = 0; k < 4; ++k)
+          two.face_vertices.push_back(first + one.face_vertices[4 * f + (k + (cube == 1 ? turn : 0)) % 4]);
+        two.face_offsets.push_back(two.face_vertices.size());
+      }
+    }
+    const auto regions = find_regions(triangulate(two));
+    if (!regions) continue;
+    for (const Group& region : regions->regions) {
+      const RegionFaces faces = faces_of_region(two, *regions, region.number);
+      CHECK(enclosed_volume(faces.surface, faces.is_left_out) == Approx(1));
+      std::map<std::pair<Index, Index>, int> num_faces;
+      for (std::size_t f = 0; f < two.num_faces(); ++f)
+        for (std::size_t k = 0; k < 4 && !faces.is_left_out[f]; ++k)
+          ++num_faces[std::minmax(faces.surface.face_vertices[4 * f + k],
+                                  faces.surface.face_vertices[4 * f + (k + 1) % 4])];
+      CHECK(num_faces.size() == 12);
+      for (const auto& [edge, count] : num_faces) CHECK(count == 2);
+    }
+  }
 }

@@ -287,7 +287,7 @@ TEST_CASE("A shell that is advanced into itself stops short of it", "[shell]") {
   const auto wanted = straight_columns(layers, visible.directions, thick);
   REQUIRE(check.failures(safe).none());
   REQUIRE_FALSE(check.failures(wanted).none());
-  CHECK(check.failures(advance(layers, check, safe, wanted, &shares)).none());
+  CHECK(check.failures(advance(layers, check, safe, wanted, {}, &shares)).none());
   for (std::size_t v = 0; v < layers.num_columns(); ++v) CHECK(shares[v] < 1);
 }
 
