@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -74,6 +75,27 @@ class MeshOptimizer : OptimizeDriver {
   bool is_worth_keeping(const Measured& now, const Measured& start) const;
   bool steps_ran_out() const;
   void finish(bool going);
+
+  /// What an attempt has reached.
+  struct Outcome {
+    std::vector<Vec3> positions;
+    std::size_t num_uncertified;
+    double volume_change;
+    Held held;
+    std::vector<std::string> warnings;
+    std::vector<bool> kept;  ///< by stage of the report
+
+    /// Validity counts first, then the volumes of regions.
+    bool is_sounder_than(const Outcome& other) const {
+      return std::tie(num_uncertified, volume_change) < std::tie(other.num_uncertified, other.volume_change);
+    }
+  };
+  Outcome outcome() const;
+  /// Makes attempts that hold more and more until no region's volume changes, and takes the soundest. start: the state
+  /// before. Returns false if the work must end.
+  bool attempt_soundly(const Measured& start, const VolumeMesh& original);
+  /// Makes an outcome the present state again.
+  void take(Outcome reached);
 
   std::vector<Index> uncertified_;
   bool gains_ended_ = false;  ///< true if the rounds ended because they no longer gained
@@ -252,23 +274,51 @@ bool MeshOptimizer::attempt(double least_jacobian) {
   return going;
 }
 
+MeshOptimizer::Outcome MeshOptimizer::outcome() const {
+  Outcome reached{mesh_.positions, certify(mesh_).not_certified.size(), volume_change(), held_, report_.warnings, {}};
+  for (const StageRecord& stage : report_.stages) reached.kept.push_back(stage.kept);
+  return reached;
+}
+
+void MeshOptimizer::take(Outcome reached) {
+  mesh_.positions = std::move(reached.positions);
+  held_ = reached.held;
+  report_.warnings = std::move(reached.warnings);
+  for (std::size_t i = 0; i < report_.stages.size(); ++i)
+    report_.stages[i].kept = i < reached.kept.size() && reached.kept[i];
+}
+
+bool MeshOptimizer::attempt_soundly(const Measured& start, const VolumeMesh& original) {
+  const std::vector<Vec3> positions = mesh_.positions;
+  const std::vector<std::string> warnings = report_.warnings;
+  bool going = attempt(start.least_jacobian);
+  Outcome soundest = outcome();
+  while (going && keeps_volumes() && !interfaces_.empty() && held_ != Held::sheets && changes_volumes()) {
+    report_.undo_stages(0, report_.stages.size());
+    mesh_.positions = positions;
+    mesh_.tags = original.tags;
+    report_.warnings = warnings;
+    held_ = static_cast<Held>(static_cast<int>(held_) + 1);
+    going = attempt(start.least_jacobian);
+    Outcome reached = outcome();
+    if (!soundest.is_sounder_than(reached)) soundest = std::move(reached);
+  }
+  take(std::move(soundest));
+  return going;
+}
+
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   measure_start();
   const Measured start = measure();
   std::vector<Vec3> start_positions = mesh_.positions;
   const std::size_t warnings_before = report_.warnings.size();
-  bool going = attempt(start.least_jacobian);
-  while (going && keeps_volumes() && !interfaces_.empty() && held_ != Held::sheets && changes_volumes()) {
-    report_.undo_stages(0, report_.stages.size());
-    mesh_.positions = start_positions;
-    mesh_.tags = original.tags;
-    report_.warnings.resize(warnings_before);
-    held_ = static_cast<Held>(static_cast<int>(held_) + 1);
-    going = attempt(start.least_jacobian);
-  }
+  const bool going = attempt_soundly(start, original);
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
-  if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {
+  const bool is_kept = start.uncertified == 0 && !wants_other_sizes
+                           ? is_worth_keeping(measure(), start)
+                           : certify(mesh_).not_certified.size() <= start.uncertified;
+  if (is_kept) {
     result.mesh.positions = target_.normalization.from_unit(mesh_.positions);
     if (held_ >= Held::interfaces)
       report_.warnings.push_back(

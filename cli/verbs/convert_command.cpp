@@ -40,7 +40,7 @@ void convert_volume(const ConvertArguments& arguments, VolumeMesh mesh, std::vec
   }));
 }
 
-/// returns  an ExitStatus: that of the polynomial cells that were written.
+/// returns  an ExitStatus: that of the polynomial cells and of the linear ones that were written.
 int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& file, std::vector<Output>& outputs,
                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
@@ -56,7 +56,11 @@ int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& f
       });
   for (const PolynomialCells& cells : polynomials)
     for (const std::string& warning : polynomial_cells_warnings(cells)) warnings.push_back(warning);
-  return polynomial_cells_status(polynomials);
+  const std::optional<VolumeMesh> linear = written_cells(outputs);
+  const std::vector<std::string> found =
+      linear ? linear_cells_warnings(check_mesh(*linear)) : std::vector<std::string>{};
+  warnings.insert(warnings.end(), found.begin(), found.end());
+  return found.empty() ? polynomial_cells_status(polynomials) : kFailed;
 }
 
 void convert_surface(const ConvertArguments& arguments, const PolygonMesh& surface, std::vector<Output>& outputs,

@@ -6,7 +6,6 @@
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/report.h"
-#include "cli/runs/written_result.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
@@ -59,13 +58,21 @@ void CurvedOptimizeRun::write() {
 
 void CurvedOptimizeRun::check() {
   const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
-  const HighOrderMesh& mesh = written ? *written : file_.mesh;
-  const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(arguments_.writing));
-  mesh_check_ = watched([&](auto progress) {
-    return check_mesh(mesh, boundary, static_cast<const TriangleMesh*>(nullptr),
-                      {.labels = {file_.references, file_.regions}, .progress = progress});
-  });
+  const auto check_curved = [&](const HighOrderMesh& mesh) {
+    const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(arguments_.writing));
+    return watched([&](auto progress) {
+      return check_mesh(mesh, boundary, static_cast<const TriangleMesh*>(nullptr),
+                        {.labels = {file_.references, file_.regions}, .progress = progress});
+    });
+  };
+  mesh_check_ = check_curved(written ? *written : file_.mesh);
   add_warnings(warnings_of_quality(arguments_.optimize.quality, mesh_check_));
+  polynomials_ = check_polynomial_cells(outputs_, file_.mesh, arguments_.writing.map_tolerance_percent, check_curved);
+  for (const PolynomialCells& cells : polynomials_) add_warnings(polynomial_cells_warnings(cells));
+  if (const std::optional<VolumeMesh> linear = written_cells(outputs_)) {
+    linear_ = check_mesh(*linear);
+    add_warnings(linear_cells_warnings(*linear_));
+  }
 }
 
 Json CurvedOptimizeRun::report() const {
@@ -78,6 +85,8 @@ Json CurvedOptimizeRun::report() const {
   json.update(check_json(mesh_check_));
   checkpointing_->describe(json);
   json["not_certified_cells"] = not_certified_cells(mesh_check_);
+  if (linear_) json["linear_cells"] = check_json(*linear_);
+  if (!polynomials_.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials_);
   return json;
 }
 
@@ -97,7 +106,8 @@ int CurvedOptimizeRun::run() {
   write_report(report());
   if (!arguments_.run.quiet) summarize();
   require_outputs();
-  return status(fit_, mesh_check_.valid());
+  const int of_cells = status(fit_, mesh_check_.valid() && (!linear_ || linear_->valid()));
+  return of_cells == kDone ? polynomial_cells_status(polynomials_) : of_cells;
 }
 
 }  // namespace subvol::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/checkpointing.h"
+#include "cli/runs/written_result.h"
 #include "cli/verbs/long_run.h"
 #include "cli/verbs/optimize_run.h"
 #include "subvol/export/high_order_file.h"
@@ -37,6 +38,8 @@ class CurvedOptimizeRun : public LongRun {
   std::optional<Checkpointing> checkpointing_;
   FitReport fit_;
   MeshCheck mesh_check_;
+  std::optional<MeshCheck> linear_;  ///< of linear cells that were written in place of the curved ones
+  std::vector<PolynomialCells> polynomials_;
 };
 
 }  // namespace subvol::cli

@@ -156,3 +156,22 @@ TEST_CASE("fit and optimize: curved cells of other programs are the start of a f
   CHECK(place.run("optimize curved.msh --target target.off --sizes uniform -o x.vtu").status == 2);
   CHECK_THAT(place.run("fit target.off --template curved.msh -o x.mesh").err, Contains("fit --order"));
 }
+
+TEST_CASE("convert, optimize: linear cells that are not valid though the curved ones are, are told", "[cli]") {
+  // A tet whose edge nodes bend it so far that one of eight linear tets is inverted.
+  const Workplace place;
+  place.file("tet.msh",
+             "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n10\n1 -0.598 0.553 0.581\n2 0.293 -0.644 0.707\n"
+             "3 0.707 0 0.707\n4 0 0 1\n5 -0.23 -0.068 0.971\n6 0.541 -0.348 0.765\n7 0.055 0.276 0.644\n"
+             "8 -0.336 0.311 0.889\n9 0.159 -0.348 0.924\n10 0.383 0 0.924\n$EndNodes\n$Elements\n1\n"
+             "1 11 2 1 1 1 2 3 4 5 6 7 8 10 9\n$EndElements\n");
+  CHECK(place.run("check tet.msh").status == 0);
+  const Run converted = place.run("convert tet.msh -o linear.mesh");
+  CHECK(converted.status == 1);
+  CHECK_THAT(converted.err, Contains("1 of 8 are inverted"));
+  CHECK(place.run("convert tet.msh -o finer.mesh --intervals 8").status == 0);
+  const Run optimized = place.run("optimize tet.msh --fixed-boundary -o optimized.mesh --report report.json");
+  CHECK(optimized.status == 1);
+  CHECK(place.json("report.json")["valid"] == true);
+  CHECK(place.json("report.json")["linear_cells"]["valid"] == false);
+}

@@ -14,6 +14,7 @@
 #include <catch2/catch.hpp>
 #include <omp.h>
 
+#include <algorithm>
 #include <random>
 
 using namespace subvol;
@@ -183,6 +184,26 @@ TEST_CASE("Optimization says which cells stay inverted") {
   REQUIRE_FALSE(result.uncertified.empty());
   CHECK(result.uncertified[0] == 0);
   for (const Vec3& p : result.mesh.positions) CHECK(p.allFinite());
+}
+
+TEST_CASE("Two tangled regions become valid, also if their volumes cannot be kept") {
+  for (const unsigned seed : {3u, 13u, 17u, 18u}) {
+    CAPTURE(seed);
+    VolumeMesh mesh = test::lattice(4, 4, 4);
+    std::mt19937 random(seed);
+    const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    for (Vec3& p : mesh.positions) {
+      const bool is_inner = (p.array() > 0.5).all() && (p.array() < 3.5).all();
+      for (int i = 0; i < 3; ++i) {
+        const double move = unit() + unit() + unit() - 1.5;
+        if (is_inner) p[i] += 0.96 * move;
+      }
+    }
+    mesh.references.assign(mesh.num_cells(), 1);
+    std::fill(mesh.references.begin() + 32, mesh.references.end(), 2);
+    CHECK(certify(mesh).not_certified.size() > 20);
+    CHECK(optimize_mesh(mesh, nullptr, {}).uncertified.empty());
+  }
 }
 
 TEST_CASE("Optimization draws the boundary to a target, and keeps references and tags") {
