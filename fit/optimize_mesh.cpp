@@ -2,6 +2,7 @@
 #include "subvol/fit/optimize_mesh.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/text_scanner.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/fit/fits/flat_faces.h"
@@ -12,6 +13,8 @@
 #include "subvol/fit/stages/untangle.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <span>
 #include <string>
 #include <tuple>
@@ -48,6 +51,33 @@ struct Progress {
            (max_percent > wanted_percent && max_percent < (1 - kLeastApproach) * before.max_percent);
   }
 };
+
+/// Returns a warning about groups of faces inside regions, if some have left their planes: nothing holds these.
+std::optional<std::string> inner_groups_warning(const VolumeMesh& before, const VolumeMesh& after,
+                                                const MeshTopology& topology, double diagonal) {
+  constexpr double kTold = 1e-6;  // of the diagonal
+  const auto reference = [&](Index cell) { return before.references.empty() ? 0 : before.references[cell]; };
+  double most = 0;
+  Index moved = kNoIndex;
+  for (std::size_t f = 0; f < topology.num_faces() && !before.face_groups.empty(); ++f) {
+    const auto [first, second] = topology.face_cells(static_cast<Index>(f));
+    if (second == kNoIndex || reference(first) != reference(second)) continue;
+    const auto corners = topology.face(static_cast<Index>(f));
+    const Index group = group_of(before.face_groups, corners);
+    if (group == kNoIndex) continue;
+    const auto& x = before.positions;
+    const Vec3 normal =
+        (x[corners[2]] - x[corners[0]]).cross(x[corners[corners.size() - 1]] - x[corners[1]]).stableNormalized();
+    for (const Index v : corners)
+      if (const double way = std::abs(normal.dot(after.positions[v] - x[v])); way > most) most = way, moved = group;
+  }
+  if (most <= kTold * diagonal) return std::nullopt;
+  const Group& group = before.face_groups.groups[moved];
+  return formatted(
+      "faces of the group %s inside the mesh left their planes by up to %.3g %% of the diagonal: only the "
+      "boundary and interfaces between regions are held",
+      group.name.empty() ? std::to_string(group.number).c_str() : in_quotes(group.name).c_str(), 100 * most / diagonal);
+}
 
 double mean_of(std::span<const double> values) {
   double sum = 0;
@@ -336,6 +366,8 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   if (options_.fixed_boundary)
     for (std::size_t v = 0; v < original.num_vertices(); ++v)
       if (topology_.is_boundary_vertex(static_cast<Index>(v))) result.mesh.positions[v] = original.positions[v];
+  if (const auto warning = inner_groups_warning(original, result.mesh, topology_, target_.normalization.diagonal))
+    report_.warnings.push_back(*warning);
   uncertified_ = certify(result.mesh).not_certified;
   finish(going);
   result.uncertified = std::move(uncertified_);

@@ -113,10 +113,10 @@ class Collector {
     if (model.id.empty()) model.id = model.input;
     if (as_utf8(model.id) != model.id) throw InputError("'id': expected UTF-8, got " + in_quotes(model.id));
     const BatchVerb& verb = find_verb(model.verb);
-    if (verb.has("--output")) {
-      if (model.outputs.empty()) model.outputs = defaults_.outputs;
-      std::erase(model.outputs, "none");
-    } else if (!model.outputs.empty()) {
+    const bool has_outputs = verb.has("--output");
+    if (has_outputs && model.outputs.empty()) model.outputs = defaults_.outputs;
+    std::erase(model.outputs, "none");
+    if (!has_outputs && !model.outputs.empty()) {
       throw InputError("'outputs': " + model.verb + " writes none");
     }
     require_known_options(model, verb);

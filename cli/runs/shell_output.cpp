@@ -2,6 +2,7 @@
 #include "cli/runs/shell_output.h"
 
 #include "cli/runs/exit_status.h"
+#include "subvol/base/format.h"
 #include "subvol/export/cell_text.h"
 #include "subvol/export/read_back.h"
 #include "subvol/export/volume_writer.h"
@@ -113,6 +114,20 @@ std::vector<VertexField> thickness_fields(const ShellResult& shell) {
           {"thickness_asked", by_vertex(shell.layers, shell.asked)},
           {"thickness_limited", by_vertex(shell.layers, shell.limited)},
           {"clearance", by_vertex(shell.layers, shell.clearance)}};
+}
+
+/// Returns the distance of the first sheet from the surface along each column of a side. first: strand of the side.
+std::vector<double> first_heights(const ShellResult& shell, std::size_t first) {
+  const ShellLayers& layers = shell.layers;
+  const int sheet = layers.inside + (first == 0 ? -1 : 1);
+  std::vector<double> heights;
+  for (std::size_t v = 0; v < layers.num_columns(); ++v) {
+    const auto column = static_cast<Index>(v);
+    heights.push_back((shell.mesh.positions[layers.vertex(sheet, column)] -
+                       shell.mesh.positions[layers.vertex(layers.inside, column)])
+                          .norm());
+  }
+  return heights;
 }
 
 }  // namespace
@@ -242,6 +257,10 @@ Json layers_json(const ShellResult& shell) {
     const ThicknessFigures asked({shell.asked.data() + first, layers.num_columns()});
     const double share = first == 0 ? layers.inside_shares[1] : layers.outside_shares[1];
     json[std::string("first_height_") + side] = share * asked.mean;
+    const std::vector<double> heights = first_heights(shell, first);
+    const ThicknessFigures achieved(heights);
+    json[std::string("first_height_achieved_") + side] = {
+        {"mean", achieved.mean}, {"min", achieved.least}, {"max", achieved.most}};
   });
   return json;
 }
@@ -281,6 +300,27 @@ Json shell_groups_json(const ShellResult& shell) {
 Json corner_quality_json(const ShellResult& shell) {
   return {{"min_scaled_jacobian", shell.corner_quality.min_scaled_jacobian},
           {"mean_scaled_jacobian", shell.corner_quality.mean_scaled_jacobian}};
+}
+
+std::vector<std::string> thickness_warnings(const ShellResult& shell, std::optional<double> first_height) {
+  constexpr double kLeastShare = 0.5, kMostOff = 0.1;
+  std::vector<std::string> warnings;
+  const std::size_t n = shell.layers.num_columns();
+  for_each_side(shell.layers, [&](const char* side, std::size_t first) {
+    const ThicknessFigures asked({shell.asked.data() + first, n}), found({shell.achieved.data() + first, n});
+    if (found.mean < kLeastShare * asked.mean)
+      warnings.push_back(
+          formatted("the layers %s are %.6g thick on average, %.3g %% of what was asked: they could not grow "
+                    "further",
+                    side, found.mean, 100 * found.mean / asked.mean));
+    if (!first_height) return;
+    const std::vector<double> heights = first_heights(shell, first);
+    const ThicknessFigures height(heights);
+    if (std::abs(height.mean - *first_height) > kMostOff * *first_height)
+      warnings.push_back(formatted("the first layer %s is %.6g to %.6g high, %.6g on average, where %.6g was asked",
+                                   side, height.least, height.most, height.mean, *first_height));
+  });
+  return warnings;
 }
 
 std::string thickness_text(const ShellResult& shell) {

@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace subvol::cli {
 
@@ -38,6 +39,9 @@ Json border_json(const ShellResult& shell, double diagonal);
 Json shell_groups_json(const ShellResult& shell);
 /// Scaled Jacobian at the corners of the linear cells, relative to the ideal cells.
 Json corner_quality_json(const ShellResult& shell);
+/// Warnings about sides whose layers are much thinner than asked for, or whose first layer is, on average, more than a
+/// tenth off the height that was asked for. first_height: nothing if none was.
+std::vector<std::string> thickness_warnings(const ShellResult& shell, std::optional<double> first_height);
 /// The thicknesses as text, one line for each side.
 std::string thickness_text(const ShellResult& shell);
 

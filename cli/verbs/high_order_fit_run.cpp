@@ -150,6 +150,10 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   require_regions(outputs, regions_of(template_mesh));
   if (loaded.curved && is_cloud(target))
     throw UsageError(arguments.template_mesh.path + ": curved cells are drawn to a surface, not to points");
+  if (loaded.curved && verb.count("--order") > 0 && arguments.fit.order < loaded.curved->space.max_order())
+    throw UsageError("--order " + std::to_string(arguments.fit.order) + ": " + arguments.template_mesh.path +
+                     " has cells of order " + std::to_string(loaded.curved->space.max_order()) +
+                     ", and orders are not lowered");
   const double read_seconds = seconds_since(start) - template_seconds;
   Json input{{"target", describe(arguments.target, target)}};
   input[arguments.untangles ? "mesh" : "template"] = describe(arguments.template_mesh.path, template_mesh);

@@ -61,6 +61,8 @@ class ShellRun : public LongRun {
   void require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const;
   void load();
   void mend();
+  /// The height that was asked for, in the mesh's unit.
+  std::optional<double> first_height() const;
   void plan_layers(ShellOptions& options) const;
   void grow();
   void curve();
@@ -151,12 +153,17 @@ void ShellRun::grow() {
   if (result_.mesh.num_cells() == 0)
     throw EndedEarly(arguments_.surface + ": the work was ended before there was a shell", kInterrupted);
   add_warnings(result_.report.warnings);
+  add_warnings(thickness_warnings(result_, first_height()));
+}
+
+std::optional<double> ShellRun::first_height() const {
+  if (arguments_.first_height.empty()) return std::nullopt;
+  return parse_length("--first-height", arguments_.first_height, diagonal_);
 }
 
 void ShellRun::plan_layers(ShellOptions& options) const {
   const auto is_given = [&](const char* option) { return verb_.get_option(option)->count() > 0; };
-  const LayerPlan plan = planned_layers(options.thickness,
-                                        parse_length("--first-height", arguments_.first_height, diagonal_),
+  const LayerPlan plan = planned_layers(options.thickness, *first_height(),
                                         is_given("--layers") ? std::optional(options.layers) : std::nullopt,
                                         is_given("--growth") ? std::optional(options.growth) : std::nullopt);
   options.layers = plan.layers;
@@ -293,6 +300,8 @@ int ShellRun::run() {
   if (!arguments_.first_height.empty() && arguments_.thickness.empty())
     throw UsageError("shell: --first-height goes with --thickness, not with one thickness for each vertex");
   parse_repair("--repair", arguments_.repair, 1);
+  if (arguments_.shell.free_surface && arguments_.straight)
+    throw UsageError("shell: --straight and --free-surface exclude each other: straight columns stand on the surface");
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
   prepare({Part::cage, Part::cutaway, Part::boundary});
   timed("read", &ShellRun::load);

@@ -171,6 +171,8 @@ VolumeMesh make_merged(EditArguments& arguments) {
 
 VolumeMesh make_split(EditArguments& arguments) {
   const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  if (arguments.what == "tets" && !arguments.vertices.empty())
+    throw UsageError("template split: --into tets cuts all cells; leave --edge out");
   if (arguments.what == "tets") return split_into_tets(mesh);
   if (arguments.vertices.empty()) throw UsageError("template split: --into " + arguments.what + " needs --edge A B");
   const Index a = arguments.vertices[0], b = arguments.vertices[1];

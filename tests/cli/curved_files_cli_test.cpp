@@ -169,7 +169,7 @@ TEST_CASE("convert, optimize: linear cells that are not valid though the curved 
   const Run converted = place.run("convert tet.msh -o linear.mesh");
   CHECK(converted.status == 1);
   CHECK_THAT(converted.err, Contains("1 of 8 are inverted"));
-  CHECK(place.run("convert tet.msh -o finer.mesh --intervals 8").status == 0);
+  CHECK(place.run("convert tet.msh -o finer.mesh --intervals 32").status == 0);
   const Run optimized = place.run("optimize tet.msh --fixed-boundary -o optimized.mesh --report report.json");
   CHECK(optimized.status == 1);
   CHECK(place.json("report.json")["valid"] == true);

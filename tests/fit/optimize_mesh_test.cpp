@@ -186,6 +186,27 @@ TEST_CASE("Optimization says which cells stay inverted") {
   for (const Vec3& p : result.mesh.positions) CHECK(p.allFinite());
 }
 
+TEST_CASE("Optimization tells if a named plane inside the mesh is bent") {
+  VolumeMesh mesh = test::lattice(4, 4, 4);
+  const MeshTopology topology(mesh);
+  mesh.face_groups.groups = {{"mid plane", 1, 2}};
+  for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+    const auto corners = topology.face(static_cast<Index>(f));
+    if (std::all_of(corners.begin(), corners.end(), [&](Index v) { return mesh.positions[v].x() == 2; }))
+      mesh.face_groups.faces.push_back({face_key(corners), 0});
+  }
+  normalize(mesh.face_groups);
+  REQUIRE(mesh.face_groups.faces.size() == 16);
+  const auto warnings_of = [](const VolumeMesh& given) { return optimize_mesh(given, nullptr, {}).report.warnings; };
+  CHECK(warnings_of(mesh).empty());
+  for (Vec3& p : mesh.positions)
+    if ((p.array() > 0.5).all() && (p.array() < 3.5).all() && p.x() != 2) p += Vec3(0.3, 0.2 * p.y(), -0.2);
+  const std::vector<std::string> warnings = warnings_of(mesh);
+  CHECK(std::ranges::any_of(warnings, [](const std::string& text) {
+    return text.find("'mid plane' inside the mesh left their planes") != std::string::npos;
+  }));
+}
+
 TEST_CASE("Two tangled regions become valid, also if their volumes cannot be kept") {
   for (const unsigned seed : {3u, 13u, 17u, 18u}) {
     CAPTURE(seed);

@@ -217,6 +217,14 @@ TEST_CASE("two curves may join a third one at the same vertex") {
   CHECK(parts.curves[0].points.back().isApprox(Vec3(1, 0, 0)));
   CHECK(parts.curves[2].points.front().isApprox(Vec3(1, 0, 0)));
   CHECK(parts.curves[1].points == features.curves.curves[1].points);
+  // Beyond the junction, each keeps its own course.
+  for (const std::size_t c : {std::size_t{0}, std::size_t{2}}) {
+    const std::vector<Vec3>& points = parts.curves[c].points;
+    REQUIRE(points.size() == 3);
+    const double y = c == 0 ? 1 : -1;
+    CHECK(points[1].isApprox(Vec3(4, y, 0) / std::sqrt(17)));
+    CHECK(points[c == 0 ? 0 : 2].isApprox(Vec3(4, y, 0)));
+  }
 }
 
 TEST_CASE("curves that leave the mesh are followed as far as it reaches") {
