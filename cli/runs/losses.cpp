@@ -31,7 +31,7 @@ bool has_face_of_several_groups(const VolumeFaceGroups& groups) {
 }
 
 /// Returns a name in quotes: on one line, and cut if it is long.
-std::string shown(std::string label) {
+std::string quoted_label(std::string label) {
   constexpr std::size_t kLongest = 60;
   std::replace_if(
       label.begin(), label.end(), [](unsigned char c) { return c < ' ' || c == 127; }, ' ');
@@ -80,7 +80,7 @@ std::string shared_faces_lost(const Output& output, std::span<const SharedGroup>
     const std::size_t faces = of_boundary ? group.boundary_faces : group.faces,
                       lost = of_boundary ? group.boundary_lost : group.lost;
     if (lost == 0 || ++num_groups > kMostListed) continue;
-    list += (list.empty() ? "" : ", ") + shown(group.label) + " loses " +
+    list += (list.empty() ? "" : ", ") + quoted_label(group.label) + " loses " +
             (lost == faces ? "all" : std::to_string(lost)) + " of its " + std::to_string(faces) + " faces";
   }
   if (list.empty()) return {};

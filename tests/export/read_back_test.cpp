@@ -7,6 +7,7 @@
 #include "subvol/export/obj_writer.h"
 #include "subvol/export/usd_writer.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/io/nodal_mesh.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/element_fixtures.h"
@@ -16,6 +17,7 @@
 #include <catch2/catch.hpp>
 
 #include <functional>
+#include <limits>
 
 #include <sys/stat.h>
 
@@ -84,6 +86,45 @@ TEST_CASE("cells that were written are told from cells that differ in anything")
     write_volume(folder / name, mesh, {});
     tells<VolumeMesh>(folder / name, mesh, {moved, turned, fewer, more});
   }
+}
+
+TEST_CASE("references of ten digits come back from a .bdf of cells of both orders") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 2, 1);
+  mesh.references = {123456789, 123456780, std::numeric_limits<int>::max(), 12345678};
+  write_volume(folder / "a.bdf", mesh);
+  CHECK_NOTHROW(require_written(folder / "a.bdf", mesh));
+  CHECK(read_nodal_mesh(folder / "a.bdf").references == mesh.references);
+  const HighOrderMesh curved = curved_mesh(mesh);
+  const HighOrderFileOptions options{.references = mesh.references};
+  write_volume(folder / "c.bdf", curved, options);
+  CHECK_NOTHROW(require_written(folder / "c.bdf", curved, options));
+  CHECK(read_nodal_mesh(folder / "c.bdf").references == mesh.references);
+}
+
+TEST_CASE("regions with names like those of references stay apart in a .inp") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 2, 1);
+  mesh.references = {3, 3, 7, 7};
+  mesh.regions = {{"reference 7", 3, 3}};
+  write_volume(folder / "a.inp", mesh);
+  CHECK_NOTHROW(require_written(folder / "a.inp", mesh));
+  CHECK(read_nodal_mesh(folder / "a.inp").references == mesh.references);
+}
+
+TEST_CASE("cells whose coordinates have too few digits in a file are told, with what to do") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 2, 1);
+  for (Vec3& p : mesh.positions) p = 0.3 * p + Vec3(1e6, -1e6, 1e6);
+  for (const char* name : {"near.bdf", "near.inp"}) {
+    write_volume(folder / name, mesh);
+    CHECK_NOTHROW(require_written(folder / name, mesh));
+  }
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    mesh.positions[v] = Vec3::Constant(1e14) + 0.5 * lattice(2, 2, 1).positions[v];
+  write_volume(folder / "far.bdf", mesh);
+  CHECK_THROWS_WITH(require_written(folder / "far.bdf", mesh),
+                    Contains("moved by") && Contains("more digits") && Contains(".msh"));
 }
 
 TEST_CASE("curved cells that were written are told from others") {
