@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -282,34 +283,52 @@ class ExodusParser {
     }
   }
 
-  /// The block whose name a block continues for another kind of cell; itself if there is none.
-  const Block& first_of(const Block& block) const {
-    for (const Block& other : blocks_)
-      if (block.kind && !other.name.empty() && block.name == other.name + kind_suffix(*block.kind)) return other;
-    return block;
+  /// For each block, the place of the one whose name it continues for another kind of cell, which stands before it with
+  /// no others between them; its own place if there is none.
+  std::vector<std::size_t> first_blocks() const {
+    std::vector<std::size_t> firsts;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      const std::size_t before = b > 0 ? firsts.back() : b;
+      const bool continues = b > 0 && block.kind && blocks_[before].kind && !blocks_[before].name.empty() &&
+                             block.name == blocks_[before].name + kind_suffix(*block.kind);
+      firsts.push_back(continues ? before : b);
+    }
+    return firsts;
   }
-  /// The reference that subvol has named a block after.
-  static std::optional<int> own_reference(const Block& block) {
+  /// The reference in the name of a block that subvol may have named.
+  static std::optional<int> named_reference(const Block& block) {
     if (!block.name.starts_with(kReferenceBlock)) return std::nullopt;
     const auto number = parse_integer(std::string_view(block.name).substr(kReferenceBlock.size()));
     if (!number || std::abs(*number) > std::numeric_limits<int>::max()) return std::nullopt;
     return static_cast<int>(*number);
   }
 
+  /// A block stands for the reference in its name, unless that is the number of another block, or in the name of
+  /// another one: two regions would become one.
   void name_references() {
     const auto is_of_cells = [](const Block& block) { return block.kind.has_value(); };
     const bool has_one = std::count_if(blocks_.begin(), blocks_.end(), is_of_cells) == 1;
+    const std::vector<std::size_t> firsts = first_blocks();
+    std::set<long long> numbers;
+    std::map<int, int> num_named;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (!blocks_[b].kind || firsts[b] != b) continue;
+      numbers.insert(blocks_[b].id);
+      if (const auto named = named_reference(blocks_[b])) ++num_named[*named];
+    }
     mesh_.references.assign(mesh_.num_cells(), 0);
-    std::set<int> named;
-    for (const Block& block : blocks_) {
+    std::set<int> named_regions;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block &block = blocks_[b], &first = blocks_[firsts[b]];
       if (!block.kind) continue;
-      const Block& first = first_of(block);
-      const std::optional<int> own = own_reference(first);
+      std::optional<int> own = named_reference(first);
+      if (own && *own != first.id && (num_named[*own] > 1 || numbers.contains(*own))) own.reset();
       if (has_one && !own && first.name.empty()) continue;  // nothing is told by a single block without a name
       const int reference = own ? *own : number_of(first.id, "eb_prop1");
       std::fill_n(mesh_.references.begin() + static_cast<std::ptrdiff_t>(block.first_cell), block.num_elements,
                   reference);
-      if (!own && !first.name.empty() && named.insert(reference).second)
+      if (!own && !first.name.empty() && named_regions.insert(reference).second)
         mesh_.regions.push_back({first.name, reference, 3});
     }
   }

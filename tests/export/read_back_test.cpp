@@ -8,6 +8,7 @@
 #include "subvol/export/usd_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
+#include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/element_fixtures.h"
@@ -16,6 +17,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 
@@ -102,14 +104,44 @@ TEST_CASE("references of ten digits come back from a .bdf of cells of both order
   CHECK(read_nodal_mesh(folder / "c.bdf").references == mesh.references);
 }
 
-TEST_CASE("regions with names like those of references stay apart in a .inp") {
+TEST_CASE("regions with names like those of references stay apart in every format") {
   const TemporaryFolder folder;
   VolumeMesh mesh = lattice(2, 2, 1);
-  mesh.references = {3, 3, 7, 7};
-  mesh.regions = {{"reference 7", 3, 3}};
-  write_volume(folder / "a.inp", mesh);
-  CHECK_NOTHROW(require_written(folder / "a.inp", mesh));
-  CHECK(read_nodal_mesh(folder / "a.inp").references == mesh.references);
+  mesh.references = {3, 11, 7, 7};
+  mesh.regions = {{"A_B", 3, 3}, {"reference 7", 11, 3}};
+  for (const char* name : {"a.msh", "a.inp", "a.e", "a.vtu", "a.mesh"}) {
+    if (name == std::string("a.e") && !has_exodus()) continue;
+    if (name == std::string("a.mesh"))
+      write_volume_mesh(folder / name, mesh);
+    else
+      write_volume(folder / name, mesh);
+    CAPTURE(name);
+    CHECK_NOTHROW(require_written(folder / name, mesh));
+    const NodalMesh found = name == std::string("a.mesh") ? internal::nodal_mesh(read_volume_mesh(folder / name))
+                                                          : read_nodal_mesh(folder / name);
+    std::vector<int> references = found.references;
+    std::sort(references.begin(), references.end());
+    CHECK(references == std::vector{3, 7, 7, 11});
+  }
+  write_volume(folder / "old.msh", mesh, {}, {}, MshVersion::v2_2);
+  CHECK(read_nodal_mesh(folder / "old.msh").regions == mesh.regions);
+}
+
+TEST_CASE("names of regions that are equal, or continue another one's, come back from Exodus") {
+  if (!has_exodus()) return;
+  const TemporaryFolder folder;
+  VolumeMesh mesh = mixed_cells();
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) mesh.references.push_back(c < 2 ? 1 : 2);
+  mesh.regions = {{"core", 1, 3}, {"core", 2, 3}};
+  write_volume(folder / "a.e", mesh);
+  CHECK_NOTHROW(require_written(folder / "a.e", mesh));
+  CHECK(read_nodal_mesh(folder / "a.e").regions == mesh.regions);
+  VolumeMesh cubes = lattice(2, 1, 1);
+  cubes.references = {1, 2};
+  cubes.regions = {{"core", 1, 3}, {"core_hexes", 2, 3}};
+  write_volume(folder / "b.e", cubes);
+  CHECK_NOTHROW(require_written(folder / "b.e", cubes));
+  CHECK(read_nodal_mesh(folder / "b.e").references == cubes.references);
 }
 
 TEST_CASE("cells whose coordinates have too few digits in a file are told, with what to do") {
