@@ -15,6 +15,7 @@
 #include "subvol/io/nodal_sides.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 
@@ -408,6 +409,29 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   return mesh;
 }
 
+// --- .stl -----------------------------------------------------------------------------------------------------------
+
+/// Compares the coordinates of a binary file; those of text are the numbers themselves.
+void compare_binary_stl(const WrittenFile& file, const std::string& bytes, const TriangleMesh& wanted) {
+  constexpr double kMostShare = 1e-6;  // of the extent
+  constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50, kVertexBytes = 12;
+  Eigen::AlignedBox3d box;
+  for (const auto& triangle : wanted.triangles)
+    for (const Index v : triangle) box.extend(wanted.positions[static_cast<std::size_t>(v)]);
+  const double tolerance = kMostShare * box.sizes().maxCoeff();
+  file.same_count("bytes", bytes.size(), kHeaderBytes + kFacetBytes * wanted.triangles.size());
+  for (std::size_t t = 0; t < wanted.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t j = 0; j < 3; ++j) {
+        float x = 0;
+        std::memcpy(&x, bytes.data() + kHeaderBytes + kFacetBytes * t + kVertexBytes * (k + 1) + j * sizeof x,
+                    sizeof x);
+        const double error =
+            x - wanted.positions[static_cast<std::size_t>(wanted.triangles[t][k])][static_cast<int>(j)];
+        file.same(std::abs(error) <= tolerance, "the corners of triangle", t);
+      }
+}
+
 // --- .glb, .gltf ----------------------------------------------------------------------------------------------------
 
 /// The numbers of an accessor.
@@ -559,8 +583,9 @@ void require_written(const fs::path& path, const PolygonMesh& surface) {
   read_back(path, [&](const WrittenFile& file) {
     const std::string extension = lower_case_extension(path);
     if (is_surface_output(extension)) {
-      if (read_file(path.string()) != surface_bytes(extension, surface))
-        file.differs("its bytes are not what was written");
+      const std::string bytes = read_file(path.string());
+      if (bytes != surface_bytes(extension, surface)) file.differs("its bytes are not what was written");
+      if (extension == ".stl" && !bytes.starts_with("solid ")) compare_binary_stl(file, bytes, triangulate(surface));
       return;
     }
     Vec3 origin = Vec3::Zero();
