@@ -170,8 +170,11 @@ void compare_vtu(const WrittenFile& file, const CellView& wanted) {
   file.same(std::ranges::equal(references, wanted.references), "references of cells, all", references.size());
 }
 
-void skip_to(TextScanner& scan, std::string_view section) {
-  while (scan.word(std::string(section).c_str()) != section) continue;
+/// Goes behind the line that begins a section; names of groups, which may be the same words, stand within lines.
+void skip_to(TextScanner& scan, const char* section) {
+  while (const auto line = scan.line())
+    if (*line == section) return;
+  scan.word(section);  // the file ends: this says what was expected
 }
 
 /// The order of cells in a .msh.
@@ -378,7 +381,7 @@ PolygonMesh obj_polygons(const WrittenFile& file) {
 /// Reads the numbers of a value of a .usda: an array, or a tuple, which ends at the first closing bracket.
 std::vector<double> usda_numbers(const WrittenFile& file, const std::string& bytes, const std::string& declaration,
                                  const std::string& brackets = "[]") {
-  const std::string opening = ' ' + declaration + " = " + brackets[0];
+  const std::string opening = "\n    " + declaration + " = " + brackets[0];  // not within a name of a group
   const std::size_t begin = bytes.find(opening), end = bytes.find(brackets[1], begin + opening.size());
   if (begin == std::string::npos || end == std::string::npos) file.differs("there is no " + declaration);
   std::string numbers = bytes.substr(begin + opening.size(), end - begin - opening.size());
@@ -396,7 +399,7 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   const std::vector<double> points = usda_numbers(file, bytes, "point3f[] points");
   origin = Vec3::Zero();
   const std::string translate = "double3 xformOp:translate";
-  if (bytes.find(translate) != std::string::npos) {
+  if (bytes.find("\n    " + translate + " = ") != std::string::npos) {
     const std::vector<double> value = usda_numbers(file, bytes, translate, "()");
     file.same_count("coordinates of the translation", value.size(), 3);
     origin = Vec3(value.data());

@@ -200,6 +200,37 @@ TEST_CASE("surfaces and scenes that were written are told from others") {
     }
 }
 
+TEST_CASE("names of groups and regions may be words of the format") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 1, 1);
+  for (const Vec3& shift : {Vec3(0, 0, 0), Vec3(100, 0, 0)}) {
+    for (Vec3& p : mesh.positions) p += shift;
+    const MeshTopology topology(mesh);
+    for (const std::string name :
+         {"a $Nodes b", "$Elements", "x double3 xformOp:translate y", " int[] faceVertexCounts = [",
+          "point3f[] points = (", "v 1 2 3", "End", "<DataArray Name=\"Points\">", "solid"}) {
+      CAPTURE(name, shift);
+      mesh.references = {1, 2};
+      mesh.regions = {{name, 2, 3}};
+      mesh.face_groups = {{{name, 1, 2}}, {{face_key(topology.face(topology.boundary_faces()[0])), 0}}};
+      for (const char* file : {"a.msh", "a.vtu", "a.inp", "a.bdf", "a.mfem"}) {
+        write_volume(folder / file, mesh);
+        CHECK_NOTHROW(require_written(folder / file, mesh));
+      }
+      write_volume(folder / "old.msh", mesh, {}, {}, MshVersion::v2_2);
+      CHECK_NOTHROW(require_written(folder / "old.msh", mesh, MshVersion::v2_2));
+      write_volume_mesh(folder / "a.mesh", mesh);
+      CHECK_NOTHROW(require_written(folder / "a.mesh", mesh));
+      const PolygonMesh surface = boundary_surface(mesh, topology, nullptr);
+      REQUIRE(!surface.face_groups.empty());
+      write_usd(folder / "a.usda", surface, {});
+      CHECK_NOTHROW(require_written(folder / "a.usda", surface));
+      write_obj(folder / "a.obj", surface);
+      CHECK_NOTHROW(require_written(folder / "a.obj", surface));
+    }
+  }
+}
+
 TEST_CASE("a file that is gone or cut off is an error, one that is no file is passed over") {
   const TemporaryFolder folder;
   const VolumeMesh mesh = tagged_mesh();
