@@ -380,12 +380,43 @@ class ExodusParser {
     file_.fail(where + ": there is no element " + std::to_string(element));
   }
 
-  /// Sets of the nodes of side sets say nothing new.
+  /// Sets of the nodes of side sets say nothing new: those of the same name, and those without one whose corners are
+  /// the ones of the side set of their number.
   void warn_of_node_sets() {
     const std::size_t n = count_of("num_node_sets");
-    for (const std::string& name : file_.names("ns_names", n))
-      if (name.empty() || std::find(side_names_.begin(), side_names_.end(), name) == side_names_.end())
-        left_out_.add("node sets");
+    const std::vector<std::string> names = file_.names("ns_names", n);
+    const std::vector<long long> numbers = ids("ns_prop1", file_.size_of("ns_prop1", n, 1));
+    for (std::size_t s = 0; s < n; ++s) {
+      const bool is_known = names[s].empty() ? holds_corners_of_group(s, numbers[s])
+                                             : std::ranges::find(side_names_, names[s]) != side_names_.end();
+      if (!is_known) left_out_.add("node sets");
+    }
+  }
+
+  bool holds_corners_of_group(std::size_t set, long long number) {
+    const auto& groups = mesh_.face_groups.groups;
+    const auto group =
+        std::ranges::find_if(groups, [&](const Group& other) { return other.number == number && other.name.empty(); });
+    if (group == groups.end()) return false;
+    const auto place = static_cast<Index>(group - groups.begin());
+    std::set<Index> wanted, found;
+    for (const GroupedFace& entry : mesh_.face_groups.faces)
+      if (entry.group == place)
+        for (const Index v : entry.face)
+          if (v != kNoIndex) wanted.insert(v);
+    if (is_corner_.empty()) {
+      is_corner_.assign(mesh_.positions.size(), false);
+      for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
+        for (const Index v : mesh_.cell(c).first(num_corners(mesh_.kinds[c])))
+          is_corner_[static_cast<std::size_t>(v)] = true;
+    }
+    const std::string suffix = std::to_string(set + 1);
+    const std::size_t size = count_of("num_nod_ns" + suffix);
+    if (size == 0) return wanted.empty();
+    for (const long long node : file_.integers("node_ns" + suffix, size))
+      if (node >= 1 && node <= static_cast<long long>(num_nodes_) && is_corner_[static_cast<std::size_t>(node) - 1])
+        found.insert(static_cast<Index>(node - 1));
+    return found == wanted;
   }
 
   ExodusFile file_;
@@ -394,6 +425,7 @@ class ExodusParser {
   LeftOut left_out_;
   std::vector<Block> blocks_;
   std::vector<std::string> side_names_;
+  std::vector<bool> is_corner_;  ///< of the nodes: one of a cell's corners; empty until it is asked for
   std::size_t num_nodes_ = 0;
 };
 

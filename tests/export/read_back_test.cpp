@@ -231,6 +231,35 @@ TEST_CASE("names of groups and regions may be words of the format") {
   }
 }
 
+TEST_CASE("what is written is read without warnings") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 2, 1);
+  for (const int kind : {0, 1, 2}) {
+    mesh.references = kind == 0 ? std::vector<int>{} : std::vector{3, 4, 3, 5};
+    if (kind == 2) mesh.regions = {{"core", 3, 3}, {"shell", 4, 3}};
+    const Group first = kind == 2 ? Group{"wall", 7, 2} : Group{"", 7, 2};
+    const MeshTopology topology(mesh);
+    const auto faces = topology.boundary_faces();
+    mesh.face_groups = {{first, {"", 9, 2}},
+                        {{face_key(topology.face(faces[0])), 0}, {face_key(topology.face(faces[3])), 1}}};
+    normalize(mesh.face_groups);
+    const HighOrderMesh curved = curved_mesh(mesh);
+    const std::vector<double> minima(4, 0.5);
+    const HighOrderFileOptions options{.cell_minima = minima,
+                                       .references = mesh.references,
+                                       .face_groups = &mesh.face_groups,
+                                       .regions = mesh.regions};
+    for (const char* name : {"a.msh", "a.vtu", "a.inp", "a.bdf", "a.mfem", "a.e"}) {
+      if (name == std::string("a.e") && !has_exodus()) continue;
+      CAPTURE(name, kind);
+      write_volume(folder / name, mesh, minima);
+      CHECK(read_nodal_mesh(folder / name).warnings == std::vector<std::string>{});
+      write_volume(folder / name, curved, options);
+      CHECK(read_nodal_mesh(folder / name).warnings == std::vector<std::string>{});
+    }
+  }
+}
+
 TEST_CASE("a file that is gone or cut off is an error, one that is no file is passed over") {
   const TemporaryFolder folder;
   const VolumeMesh mesh = tagged_mesh();
