@@ -127,8 +127,9 @@ std::vector<float> relative_positions(const std::vector<Vec3>& positions, const 
   values.reserve(3 * positions.size());
   double largest = 0;
   for (const Vec3& position : positions)
-    for (const double x : Vec3((position - place.origin) / place.unit)) {
-      values.push_back(to_float(x, "positions", refuse));
+    for (const double x : Vec3(position - place.origin)) {
+      const float plain = to_float(x, "positions", refuse);  // readers put quantized ones back to this size
+      values.push_back(place.unit == 1 ? plain : static_cast<float>(x / place.unit));
       largest = std::max(largest, std::abs(x));
     }
   if (largest > 0 && largest < kLeast) refuse("positions", "expected a size in the range of float32");
@@ -385,7 +386,8 @@ gltf::Model model_of(const Scene& scene) {
   if (scene.nodes.empty()) throw InputError("scene: expected at least one node");
   if (!(scene.meters_per_unit > 0) || !std::isfinite(scene.meters_per_unit))
     throw InputError("scene: meters_per_unit: expected a positive number");
-  if (!(scene.meters_per_unit * scene.origin).allFinite()) throw InputError("scene: origin: expected finite numbers");
+  if (!(scene.meters_per_unit * scene.origin).cast<float>().allFinite())
+    throw InputError("scene: origin: expected finite numbers in the range of float32");
   if (!(scene.seconds_per_shape > 0) || !std::isfinite(scene.seconds_per_shape))
     throw InputError("scene: seconds_per_shape: expected a positive number");
   gltf::Model model;

@@ -2,6 +2,7 @@
 #include "subvol/export/read_back.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/cell_text.h"
 #include "subvol/export/grouped_faces.h"
@@ -11,8 +12,12 @@
 #include "subvol/export/text_format.h"
 #include "subvol/export/vtu_reader.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/io/nodal_sides.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+
+#include <Eigen/Geometry>
 
 #include <tiny_gltf.h>
 
@@ -23,6 +28,7 @@
 #include <numeric>
 #include <optional>
 #include <tuple>
+#include <unordered_map>
 
 namespace subvol {
 
@@ -164,8 +170,11 @@ void compare_vtu(const WrittenFile& file, const CellView& wanted) {
   file.same(std::ranges::equal(references, wanted.references), "references of cells, all", references.size());
 }
 
-void skip_to(TextScanner& scan, std::string_view section) {
-  while (scan.word(std::string(section).c_str()) != section) continue;
+/// Goes behind the line that begins a section; names of groups, which may be the same words, stand within lines.
+void skip_to(TextScanner& scan, const char* section) {
+  while (const auto line = scan.line())
+    if (*line == section) return;
+  scan.word(section);  // the file ends: this says what was expected
 }
 
 /// The order of cells in a .msh.
@@ -270,6 +279,39 @@ void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, const Hig
 
 // --- .inp, .bdf, .mfem ----------------------------------------------------------------------------------------------
 
+/// Checks that numbers of a file stand for those of a mesh, one for one.
+class OneForOne {
+ public:
+  /// Returns false if one of them stands for another one already.
+  bool matches(std::int64_t found, std::int64_t wanted) {
+    return wanted_.try_emplace(found, wanted).first->second == wanted &&
+           found_.try_emplace(wanted, found).first->second == found;
+  }
+
+ private:
+  std::unordered_map<std::int64_t, std::int64_t> wanted_, found_;
+};
+
+/// Compares the nodes of a cell: corners of any format, and middles of edges of those that list them alike. A format of
+/// few digits may move a node by a millionth of the cell.
+void compare_nodes(const WrittenFile& file, bool is_rounded, std::span<const Vec3> found, std::span<const Vec3> wanted,
+                   std::size_t c) {
+  constexpr double kMostShare = 1e-6;
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : wanted) box.extend(p);
+  const double extent = box.sizes().maxCoeff();
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const double error = (found[i] - wanted[i]).cwiseAbs().maxCoeff();
+    if (error <= (is_rounded ? kMostShare * extent : 0)) continue;
+    const std::string cell = "the corners of cell " + std::to_string(c);
+    if (!is_rounded) file.differs(cell);
+    file.differs(
+        cell + formatted(" are moved by %.3g, and the cell is %.3g wide: ", error, extent) +
+        "its coordinates need more digits than this format has; move the mesh to the origin, or take .msh, .vtu "
+        "or .mesh");
+  }
+}
+
 /// The whole text is made again: these writers are a function of the cells alone. The reader then sees its cells.
 void compare_nodal(const WrittenFile& file, const std::string& extension, const NodalMesh& wanted) {
   const std::string text = read_file(file.path());
@@ -278,21 +320,27 @@ void compare_nodal(const WrittenFile& file, const std::string& extension, const 
   const NodalMesh found = read_nodal_mesh(file.path());
   file.same_count("cells", found.num_cells(), wanted.num_cells());
   const bool is_by_block = extension == ".e" || extension == ".exo";
+  const bool is_rounded = extension == ".bdf" || extension == ".inp";
   const std::vector<std::size_t> order =
       is_by_block ? exodus_order(wanted) : sorted_cells(wanted.num_cells(), [](std::size_t) { return 0; });
+  OneForOne nodes, references;
+  std::vector<Vec3> places, wanted_places;
   for (std::size_t n = 0; n < wanted.num_cells(); ++n) {
     const std::size_t c = order[n];
-    file.same(found.kinds[n] == wanted.kinds[c] && found.orders[n] == wanted.orders[c], "the kind of cell", c);
-    for (int i = 0; i < cell_topology(wanted.kinds[c]).num_vertices; ++i) {
-      const auto corner = [&](const NodalMesh& mesh) -> const Vec3& {
-        return mesh
-            .positions[static_cast<std::size_t>(mesh.cell(&mesh == &found ? n : c)[static_cast<std::size_t>(i)])];
-      };
-      const double size = corner(wanted).cwiseAbs().maxCoeff();
-      // Sixteen characters hold eight digits at least, twenty characters twelve.
-      const double rounding = extension == ".bdf" ? 1e-7 : extension == ".inp" ? 1e-11 : 0;
-      file.same((corner(found) - corner(wanted)).cwiseAbs().maxCoeff() <= rounding * size, "the corners of cell", c);
+    const CellKind kind = wanted.kinds[c];
+    file.same(found.kinds[n] == kind && found.orders[n] == wanted.orders[c], "the kind of cell", c);
+    file.same(references.matches(reference(found.references, n), reference(wanted.references, c)),
+              "the reference of cell", c);
+    const auto cell = found.cell(n), wanted_cell = wanted.cell(c);
+    places.clear();
+    wanted_places.clear();
+    const auto num_compared = extension == ".mfem" ? num_corners(kind) : num_edge_nodes(kind, wanted.orders[c]);
+    for (std::size_t i = 0; i < num_compared; ++i) {
+      file.same(nodes.matches(cell[i], wanted_cell[i]), "the nodes of cell", c);
+      places.push_back(found.positions[static_cast<std::size_t>(cell[i])]);
+      wanted_places.push_back(wanted.positions[static_cast<std::size_t>(wanted_cell[i])]);
     }
+    compare_nodes(file, is_rounded, places, wanted_places, c);
   }
 }
 
@@ -333,7 +381,7 @@ PolygonMesh obj_polygons(const WrittenFile& file) {
 /// Reads the numbers of a value of a .usda: an array, or a tuple, which ends at the first closing bracket.
 std::vector<double> usda_numbers(const WrittenFile& file, const std::string& bytes, const std::string& declaration,
                                  const std::string& brackets = "[]") {
-  const std::string opening = ' ' + declaration + " = " + brackets[0];
+  const std::string opening = "\n    " + declaration + " = " + brackets[0];  // not within a name of a group
   const std::size_t begin = bytes.find(opening), end = bytes.find(brackets[1], begin + opening.size());
   if (begin == std::string::npos || end == std::string::npos) file.differs("there is no " + declaration);
   std::string numbers = bytes.substr(begin + opening.size(), end - begin - opening.size());
@@ -351,7 +399,7 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   const std::vector<double> points = usda_numbers(file, bytes, "point3f[] points");
   origin = Vec3::Zero();
   const std::string translate = "double3 xformOp:translate";
-  if (bytes.find(translate) != std::string::npos) {
+  if (bytes.find("\n    " + translate + " = ") != std::string::npos) {
     const std::vector<double> value = usda_numbers(file, bytes, translate, "()");
     file.same_count("coordinates of the translation", value.size(), 3);
     origin = Vec3(value.data());
@@ -362,6 +410,29 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   for (const double vertex : usda_numbers(file, bytes, "int[] faceVertexIndices"))
     mesh.face_vertices.push_back(static_cast<Index>(vertex));
   return mesh;
+}
+
+// --- .stl -----------------------------------------------------------------------------------------------------------
+
+/// Compares the coordinates of a binary file; those of text are the numbers themselves.
+void compare_binary_stl(const WrittenFile& file, const std::string& bytes, const TriangleMesh& wanted) {
+  constexpr double kMostShare = 1e-6;  // of the extent
+  constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50, kVertexBytes = 12;
+  Eigen::AlignedBox3d box;
+  for (const auto& triangle : wanted.triangles)
+    for (const Index v : triangle) box.extend(wanted.positions[static_cast<std::size_t>(v)]);
+  const double tolerance = kMostShare * box.sizes().maxCoeff();
+  file.same_count("bytes", bytes.size(), kHeaderBytes + kFacetBytes * wanted.triangles.size());
+  for (std::size_t t = 0; t < wanted.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t j = 0; j < 3; ++j) {
+        float x = 0;
+        std::memcpy(&x, bytes.data() + kHeaderBytes + kFacetBytes * t + kVertexBytes * (k + 1) + j * sizeof x,
+                    sizeof x);
+        const double error =
+            x - wanted.positions[static_cast<std::size_t>(wanted.triangles[t][k])][static_cast<int>(j)];
+        file.same(std::abs(error) <= tolerance, "the corners of triangle", t);
+      }
 }
 
 // --- .glb, .gltf ----------------------------------------------------------------------------------------------------
@@ -515,8 +586,9 @@ void require_written(const fs::path& path, const PolygonMesh& surface) {
   read_back(path, [&](const WrittenFile& file) {
     const std::string extension = lower_case_extension(path);
     if (is_surface_output(extension)) {
-      if (read_file(path.string()) != surface_bytes(extension, surface))
-        file.differs("its bytes are not what was written");
+      const std::string bytes = read_file(path.string());
+      if (bytes != surface_bytes(extension, surface)) file.differs("its bytes are not what was written");
+      if (extension == ".stl" && !bytes.starts_with("solid ")) compare_binary_stl(file, bytes, triangulate(surface));
       return;
     }
     Vec3 origin = Vec3::Zero();

@@ -13,9 +13,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <set>
 
 namespace subvol {
 
@@ -37,7 +39,7 @@ Vec3 normal_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
   };
   const Vec3 normal = (x(1) - x(0)).cross(x(2) - x(0));
   const double length = normal.norm();
-  return length > 0 ? Vec3(normal / length) : Vec3(Vec3::Zero());
+  return length > 0 && std::isfinite(length) ? Vec3(normal / length) : Vec3(Vec3::Zero());
 }
 
 // --- STL ------------------------------------------------------------------------------------------------------------
@@ -57,51 +59,68 @@ std::string binary_stl(const TriangleMesh& mesh) {
   return bytes;
 }
 
-/// Returns true if a surface is so far from the origin that single precision would move its vertices by more than a
-/// millionth of its extent.
+/// Returns true if single precision would move a vertex by more than a millionth of the extent of the surface: far from
+/// the origin, and beyond the range of its numbers.
 bool needs_double_precision(const TriangleMesh& mesh) {
   constexpr double kMostTimes = 16;  // single precision has 24 bits: 2^-24 * 16 is about 1e-6
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  constexpr double kSmallest = std::numeric_limits<float>::min() * kMostTimes;  // of an extent
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const auto& t : mesh.triangles)
     for (const Index v : t) {
       low = low.cwiseMin(mesh.positions[static_cast<std::size_t>(v)]);
       high = high.cwiseMax(mesh.positions[static_cast<std::size_t>(v)]);
     }
-  return !mesh.triangles.empty() &&
-         low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff() > kMostTimes * (high - low).maxCoeff();
+  if (mesh.triangles.empty()) return false;
+  const double largest = low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff(), extent = (high - low).maxCoeff();
+  return largest > kMostTimes * extent || largest > kLargest || (extent > 0 && extent < kSmallest);
 }
 
 /// A name on one line.
 std::string one_line(std::string name) {
   std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, ' ');
-  return name;
+  return trimmed(name);
+}
+
+/// Returns the names of the solids: those of the groups, and one for the faces of none. No two are the same, since
+/// solids of one name are one group.
+std::vector<std::string> solid_names(const std::vector<Group>& groups) {
+  std::vector<std::string> names;
+  std::set<std::string> taken;
+  const auto add = [&](const std::string& wanted) {
+    std::string name = wanted;
+    for (int n = 2; !taken.insert(name).second; ++n) name = wanted + ' ' + std::to_string(n);
+    names.push_back(std::move(name));
+  };
+  for (const Group& group : groups) add(one_line(label_of(group)));
+  add(groups.empty() ? "subvol" : "none");
+  return names;
 }
 
 std::string text_stl(const TriangleMesh& mesh) {
-  std::string text;
+  const std::vector<std::string> names = solid_names(mesh.face_groups.groups);
   const std::size_t num_groups = mesh.face_groups.groups.size();
-  const auto group_of = [&](std::size_t t) {
-    return mesh.face_groups.empty() ? kNoIndex : mesh.face_groups.of_face[t];
-  };
-  for (std::size_t g = 0; g <= num_groups; ++g) {
-    const Index wanted = g < num_groups ? static_cast<Index>(g) : kNoIndex;
-    const std::string name = g < num_groups   ? one_line(label_of(mesh.face_groups.groups[g]))
-                             : num_groups > 0 ? "none"
-                                              : "subvol";
-    std::string facets;
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      if (group_of(t) != wanted) continue;
-      facets += "facet normal ";
-      append_vector(facets, normal_of(mesh, mesh.triangles[t]), " ");
-      facets += "\nouter loop\n";
+  std::vector<std::vector<std::size_t>> of_solid(names.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Index group = mesh.face_groups.empty() ? kNoIndex : mesh.face_groups.of_face[t];
+    of_solid[group == kNoIndex ? num_groups : static_cast<std::size_t>(group)].push_back(t);
+  }
+  std::string text;
+  for (std::size_t s = 0; s < names.size(); ++s) {
+    if (of_solid[s].empty()) continue;
+    text += "solid " + names[s] + "\n";
+    for (const std::size_t t : of_solid[s]) {
+      text += "facet normal ";
+      append_vector(text, normal_of(mesh, mesh.triangles[t]), " ");
+      text += "\nouter loop\n";
       for (const Index v : mesh.triangles[t]) {
-        facets += "vertex ";
-        append_vector(facets, mesh.positions[static_cast<std::size_t>(v)], " ");
-        facets += '\n';
+        text += "vertex ";
+        append_vector(text, mesh.positions[static_cast<std::size_t>(v)], " ");
+        text += '\n';
       }
-      facets += "endloop\nendfacet\n";
+      text += "endloop\nendfacet\n";
     }
-    if (!facets.empty()) text += "solid " + name + "\n" + facets + "endsolid " + name + "\n";
+    text += "endsolid " + names[s] + "\n";
   }
   return text;
 }

@@ -13,8 +13,9 @@ bool is_surface_output(const std::string& extension);
 
 /// Returns a surface as a file. Equal surfaces give equal bytes.
 ///
-///   .stl  triangles; binary with single precision, or, if there are groups, text with a solid for each group and one
-///         for faces of no group, whose name is "none"
+///   .stl  triangles; binary with single precision, or text if that would move vertices by more than a millionth of the
+///         extent, or if there are groups: a solid for each, and one for faces of no group, whose name is "none"; names
+///         that are taken get a number behind them
 ///   .ply  1.0, binary, little-endian, doubles; polygons; with groups the property `reference` of faces, 0 for none
 ///   .vtp  VTK XML 1.0, polygons; groups as the cell data `group` (0 for none) and the field data `group_numbers` and
 ///         `group_names`

@@ -80,12 +80,20 @@ class Writer {
 
  private:
   void add_points(const char* name, const std::vector<Vec3>& points) {
+    constexpr double kLeast = 1e-30;  // below it, single precision runs out of digits
     std::vector<float> values;
     values.reserve(3 * points.size());
+    double largest = 0;
     for (const Vec3& x : points) {
       if (!x.allFinite()) throw InputError("viewer_page: a position is not finite");
-      for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(x[k] - origin_[k]));
+      const Vec3 placed = x - origin_;
+      if (!placed.cast<float>().allFinite())
+        throw InputError("viewer_page: positions: expected numbers in the range of float32");
+      for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(placed[k]));
+      largest = std::max(largest, placed.cwiseAbs().maxCoeff());
     }
+    if (largest > 0 && largest < kLeast)
+      throw InputError("viewer_page: positions: expected a size in the range of float32");
     add(name, std::span<const float>(values), 3);
   }
   void add(const char* name, std::span<const float> values, std::size_t stride) {

@@ -300,6 +300,14 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   return check;
 }
 
+/// Adds a defect for each coefficient behind those of the vertices, which `validate` looks at, that is not finite.
+void add_modes_not_finite(const HighOrderMesh& mesh, std::vector<MeshDefect>& defects) {
+  for (std::size_t n = mesh.space.num_vertices(); n < mesh.coefficients.size(); ++n)
+    if (!mesh.coefficients[n].allFinite())
+      defects.push_back(
+          {Kind::not_finite, static_cast<Index>(n), "the coefficient of node " + std::to_string(n) + " is not finite"});
+}
+
 MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
                        const MeshCheckOptions& options, int samples_per_direction) {
   const WorkProgress& progress = options.progress;
@@ -312,6 +320,7 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
   require_extent(mesh.coefficients, "mesh check: mesh");
   MeshCheck check = count_cells(straight);
   std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
+  add_modes_not_finite(mesh, check.defects);
   check.orders = order_summary(mesh.space);
   if (!begins("quality", 0, progress, check)) return check;
   check.quality = measure_quality(mesh, samples_per_direction);
@@ -323,8 +332,7 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
   check_topology(straight, mesh.space.topology(), check);
   if (std::ranges::adjacent_find(options.labels.references, std::not_equal_to{}) != options.labels.references.end())
     check.regions = measure_regions(mesh, options.labels, &*check.quality);
-  const auto finite = [](const Vec3& x) { return x.allFinite(); };
-  if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
+  if (!has_any(check.defects, {Kind::not_finite}))
     check_boundary(boundary.triangles, boundary.faces, compare, progress, check);
   if (check.has_boundary_geometry) check.chord_error = boundary.chord_error;
   return check;

@@ -131,8 +131,8 @@ inline MeshCheck check_mesh(const VolumeMesh& mesh, std::nullptr_t, const MeshCh
   return check_mesh(mesh, static_cast<const TriangleMesh*>(nullptr), options);
 }
 
-/// Checks a curved mesh. Defects are those of the straight-sided mesh, except inverted cells, which are allowed there.
-/// There is no subdivision audit.
+/// Checks a curved mesh. Defects are those of the straight-sided mesh, except inverted cells, which are allowed there,
+/// and coefficients that are not finite; the boundary does not matter then. There is no subdivision audit.
 ///
 /// boundary               the triangles that represent the mesh's surface in the parts that need triangles; must belong
 ///                        to the mesh.

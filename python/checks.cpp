@@ -11,6 +11,7 @@
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/mesh_check.h"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -44,7 +45,11 @@ py::dict check(const py::object& object, const py::object& target_object, const 
     MeshCheckOptions options{.progress = work.parts()};
     if (mesh.linear) return check_mesh(*mesh.linear, against, options);
     options.labels = {mesh.curved->references, mesh.curved->regions};
-    return check_mesh(mesh.curved->mesh, curved_boundary(mesh.curved->mesh, writing.chord_percent), against, options);
+    const HighOrderMesh& curved = mesh.curved->mesh;
+    const bool is_finite = std::ranges::all_of(curved.coefficients, [](const Vec3& x) { return x.allFinite(); });
+    // The check reports what is not finite, and does not look at the boundary then.
+    const CurvedBoundary boundary = is_finite ? curved_boundary(curved, writing.chord_percent) : CurvedBoundary{};
+    return check_mesh(curved, boundary, against, options);
   };
   MeshCheck found = work.run("check", [&] {
     if (!target) return check_against(static_cast<const TriangleMesh*>(nullptr));

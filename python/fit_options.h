@@ -32,6 +32,9 @@ HighOrderFitOptions high_order_options(Keywords& keywords);
 /// Throws InputError, naming the function, if the work was ended before all cells were valid.
 void require_untangled(const UntangledStart& start, const char* function);
 
+/// Takes chord. InputError: as `require_chord`, before any work is done.
 void take_chord(Keywords& keywords, cli::WritingOptions& writing);
+/// InputError: a chord that the program would refuse, too.
+void require_chord(double percent);
 
 }  // namespace subvol::python

@@ -12,6 +12,7 @@
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/stages/fit_report.h"
@@ -292,7 +293,16 @@ void require_untangled(const UntangledStart& start, const char* function) {
                      std::to_string(start.left) + " cells were not yet");
 }
 
-void take_chord(Keywords& keywords, cli::WritingOptions& writing) { keywords.take("chord", writing.chord_percent); }
+void take_chord(Keywords& keywords, cli::WritingOptions& writing) {
+  keywords.take("chord", writing.chord_percent);
+  require_chord(writing.chord_percent);
+}
+
+void require_chord(double percent) {
+  constexpr double kLeast = 1e-4, kMost = 100;  // as in the program
+  if (!(percent >= kLeast && percent <= kMost))
+    throw InputError(internal::formatted("chord must be in [%g, %g] per cent, got %g", kLeast, kMost, percent));
+}
 
 void add_fits(py::module_& module) {
   py::class_<Reported, std::shared_ptr<Reported>>(module, "Result", "A result and its report.")

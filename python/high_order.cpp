@@ -106,17 +106,21 @@ Straight cells to begin with.)");
     return std::make_shared<VolumeMesh>(linear_cells(curved.mesh, intervals));
   }, py::arg("intervals"),
      "linear_cells($self, intervals)\n--\n\nThe curved cells as intervals**3 linear ones each: VolumeMesh.");
-  type.def("boundary", [](const CurvedMesh& curved, double chord) {
-    const py::gil_scoped_release unlocked;
-    CurvedBoundary boundary = curved_boundary(curved.mesh, chord);
-    const std::vector<Index> groups = groups_of_boundary(curved.face_groups, curved.mesh.space.topology());
-    boundary.triangles.face_groups.groups = curved.face_groups.groups;
-    if (!groups.empty())
-      for (const Index face : boundary.faces) boundary.triangles.face_groups.of_face.push_back(groups[face]);
-    return SurfaceMesh{as_polygons(boundary.triangles), {}};
-  }, py::arg("chord") = cli::WritingOptions{}.chord_percent,
-     "boundary($self, chord=0.005)\n--\n\n"
-     "The curved boundary as triangles within chord per cent of its diagonal: SurfaceMesh.");
+  type.def(
+      "boundary",
+      [](const CurvedMesh& curved, double chord) {
+        require_chord(chord);
+        const py::gil_scoped_release unlocked;
+        CurvedBoundary boundary = curved_boundary(curved.mesh, chord);
+        const std::vector<Index> groups = groups_of_boundary(curved.face_groups, curved.mesh.space.topology());
+        boundary.triangles.face_groups.groups = curved.face_groups.groups;
+        if (!groups.empty())
+          for (const Index face : boundary.faces) boundary.triangles.face_groups.of_face.push_back(groups[face]);
+        return SurfaceMesh{as_polygons(boundary.triangles), {}};
+      },
+      py::arg("chord") = cli::WritingOptions{}.chord_percent,
+      "boundary($self, chord=0.005)\n--\n\n"
+      "The curved boundary as triangles within chord per cent of its diagonal: SurfaceMesh.");
   type.def("copy", [](const CurvedMesh& curved) { return std::make_shared<CurvedMesh>(curved); },
            "copy($self)\n--\n\nA mesh of its own with the same content.");
   type.def("__repr__", [](const CurvedMesh& curved) {

@@ -34,6 +34,16 @@ std::optional<bool> truth_of(const py::object& object) {
   return object.cast<bool>();
 }
 
+std::optional<double> number_of(const py::object& object) {
+  const bool is_number = PyIndex_Check(object.ptr()) || py::hasattr(object, "__float__");
+  // Arrays have all that numbers have, and lists are no numbers.
+  const bool is_array = py::hasattr(object, "ndim") && object.attr("ndim").cast<int>() != 0;
+  if (!is_number || is_array || truth_of(object)) return std::nullopt;
+  const double value = PyFloat_AsDouble(object.ptr());
+  if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+  return value;
+}
+
 py::object Keywords::find(const char* name) {
   taken_.emplace_back(name);
   return given_.contains(name) ? py::object(given_[name]) : py::none();
@@ -99,10 +109,9 @@ void Keywords::read(const char* name, const py::object& given, std::size_t& valu
 }
 
 void Keywords::read(const char* name, const py::object& given, double& value) const {
-  const bool is_number = PyIndex_Check(given.ptr()) || py::hasattr(given, "__float__");
-  if (!is_number || py::isinstance<py::bool_>(given)) refuse_type(name, given, "a number");
-  value = PyFloat_AsDouble(given.ptr());
-  if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+  const std::optional<double> number = number_of(given);
+  if (!number) refuse_type(name, given, "a number");
+  value = *number;
 }
 
 void Keywords::read(const char* name, const py::object& given, std::string& value) const {

@@ -24,6 +24,9 @@ using Choices = std::vector<std::pair<const char*, Value>>;
 /// Converts True or False of Python or NumPy; nothing for other objects.
 std::optional<bool> truth_of(const py::object& object);
 
+/// Converts a number of Python or NumPy; nothing for other objects: True, False, texts, arrays and lists.
+std::optional<double> number_of(const py::object& object);
+
 /// Returns a message of the library with options of the command line named as keywords: "--time-limit" as "time_limit".
 std::string in_keywords(const std::string& message);
 

@@ -17,6 +17,7 @@
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace subvol::python {
 
@@ -79,7 +80,10 @@ class Growing {
     keywords_.take("time_limit", options_.time_limit_seconds);
     take_chord(keywords_, writing_);
     keywords_.finish();
-    require_in_range("shell", "order", curved_options_.order, 1, kMaxOrder);  // checked before the work
+    require_in_range("shell", "order", curved_options_.order, 1,
+                     kMaxOrder);  // checked before the work, as in the program
+    require_in_range("shell", "layers", options_.layers, 1, 1000);
+    require_in_range("shell", "growth", options_.growth, 0.01, 100);
     if (straight && curved_options_.order > 1) throw InputError("shell: straight and order exclude each other");
     options_.optimize = !straight;
     curved_options_.max_iterations = options_.max_iterations;
@@ -88,8 +92,10 @@ class Growing {
   void read_thickness(const py::object& thickness) {
     if (py::isinstance<py::str>(thickness)) {
       options_.thickness = cli::parse_length("thickness", thickness.cast<std::string>(), diagonal_);
-    } else if (PyFloat_Check(thickness.ptr()) || PyLong_Check(thickness.ptr())) {
-      options_.thickness = thickness.cast<double>();
+    } else if (const std::optional<double> number = number_of(thickness)) {
+      options_.thickness = *number;
+    } else if (truth_of(thickness)) {
+      throw py::type_error("shell: thickness must be a length, not " + py::repr(thickness).cast<std::string>());
     } else {
       options_.vertex_thickness = values_from(thickness, "thickness");
       if (options_.vertex_thickness.size() != given_.polygons.positions.size())
@@ -108,7 +114,7 @@ class Growing {
   void take_patches() {
     const py::object given = keywords_.object("skip");
     if (given.is_none()) return;
-    if (py::isinstance<py::str>(given) || py::isinstance<py::int_>(given)) {
+    if (py::isinstance<py::str>(given) || number_of(given)) {
       preparation_.skipped.push_back(py::str(given).cast<std::string>());
       return;
     }

@@ -245,10 +245,13 @@ VolumeFaceGroups shell_groups(const ShellLayers& layers) {
   const FaceGroups& own = layers.surface.face_groups;
   VolumeFaceGroups result{own.groups, {}};
   const auto is_taken = [&](const std::string& name) {
-    return std::any_of(own.groups.begin(), own.groups.end(), [&](const Group& group) { return group.name == name; });
+    return std::any_of(result.groups.begin(), result.groups.end(),
+                       [&](const Group& group) { return group.name == name; });
   };
   const auto add_group = [&](const std::string& name) {
-    result.groups.push_back({is_taken(name) ? "shell " + name : name, free_number(result.groups), 2});
+    std::string free = is_taken(name) ? "shell " + name : name;
+    for (int n = 2; is_taken(free); ++n) free = "shell " + name + " " + std::to_string(n);
+    result.groups.push_back({free, free_number(result.groups), 2});
     return static_cast<Index>(result.groups.size() - 1);
   };
   std::array<Index, 4> corners;

@@ -114,7 +114,8 @@ CellReference shell_reference(const ShellLayers& layers, std::vector<double> thi
 
 /// Returns the groups of the shell's faces: those of the surface's faces on its own sheet; "wall" for its faces without
 /// one; "inner" and "outer" for the innermost and the outermost sheet, if they are not the surface; "rim" for the faces
-/// along its border. If the surface uses one of these names, "shell " stands before it.
+/// along its border. If the surface uses one of these names, "shell " stands before it, and a number behind it if that
+/// is in use, too.
 ///
 /// The surface's own sheet is inside the mesh if there are layers on both sides.
 VolumeFaceGroups shell_groups(const ShellLayers& layers);

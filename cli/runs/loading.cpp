@@ -234,13 +234,21 @@ std::vector<Group> regions_of(const VolumeMesh& mesh) {
 }
 
 int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option) {
-  std::string known;
+  std::string known, same;
+  std::vector<int> found;
   for (const Group& region : regions) {
     const std::string number = std::to_string(region.number);
-    if (name == number || name == region.name) return region.number;
+    if (name == number) return region.number;
+    if (name == region.name) {
+      found.push_back(region.number);
+      same += (same.empty() ? "" : ", ") + number;
+    }
     known += (known.empty() ? "" : ", ") + number;
     if (!region.name.empty()) known += " (" + region.name + ")";
   }
+  if (found.size() == 1) return found.front();
+  if (!found.empty())
+    throw UsageError(option + ": several regions are named " + in_quotes(name) + ": " + same + "; give the number");
   throw UsageError(option + ": there is no region " + in_quotes(name) + "; there " +
                    (regions.empty() ? "is only one" : "are " + known));
 }

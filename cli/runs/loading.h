@@ -94,8 +94,8 @@ VolumeMesh labels_of(const HighOrderFile& file);
 /// Returns the regions of a mesh: their names and their references as numbers.
 std::vector<Group> regions_of(const VolumeMesh& mesh);
 
-/// Returns the number of the region with this name or number. UsageError: there is none; the message begins with
-/// `option` and lists the regions.
+/// Returns the number of the region with this number, else of the one with this name. UsageError: there is none, or
+/// several have the name; the message begins with `option` and lists the regions.
 int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option);
 
 /// UsageError: an output is the part of a region that is not among these; the message lists them.

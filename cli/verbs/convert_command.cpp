@@ -45,9 +45,7 @@ int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& f
                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output, file.mesh.space.max_order());
-  const auto is_set = [](int reference) { return reference != 0; };
-  const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
-  const Marks marks{.references = static_cast<std::size_t>(num_set), .groups = file.face_groups.groups.size()};
+  const Marks marks = marks_of(file);
   warn_of_losses(marks, marks, outputs, warnings, true);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
   const std::vector<PolynomialCells> polynomials =

@@ -183,6 +183,10 @@ std::string extension_cell(const FileFormat& format) {
 
 bool FileFormat::has_quadratic_cells_at_most() const { return orders_written == kQuadratic; }
 
+bool FileFormat::holds_all_groups_of_faces() const {
+  return holds_cells && groups_written == kNames && extension != ".mesh";
+}
+
 std::span<const FileFormat> file_formats() { return kFormats; }
 
 const FileFormat* format_of_extension(std::string_view extension) {

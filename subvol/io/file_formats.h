@@ -29,6 +29,8 @@ struct FileFormat {
   bool is_scene = false;                        ///< a scene is written: also cutaways and animations
   /// True if cells of orders 1 and 2 are written, and none of higher ones.
   bool has_quadratic_cells_at_most() const;
+  /// True if groups of faces are written and a face may be in several of them; else a face is written in the first one.
+  bool holds_all_groups_of_faces() const;
   bool needs_netcdf = false, needs_cgns = false, needs_assimp = false;  ///< the library without which it is refused
 };
 

@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -282,34 +283,52 @@ class ExodusParser {
     }
   }
 
-  /// The block whose name a block continues for another kind of cell; itself if there is none.
-  const Block& first_of(const Block& block) const {
-    for (const Block& other : blocks_)
-      if (block.kind && !other.name.empty() && block.name == other.name + kind_suffix(*block.kind)) return other;
-    return block;
+  /// For each block, the place of the one whose name it continues for another kind of cell, which stands before it with
+  /// no others between them; its own place if there is none.
+  std::vector<std::size_t> first_blocks() const {
+    std::vector<std::size_t> firsts;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      const std::size_t before = b > 0 ? firsts.back() : b;
+      const bool continues = b > 0 && block.kind && blocks_[before].kind && !blocks_[before].name.empty() &&
+                             block.name == blocks_[before].name + kind_suffix(*block.kind);
+      firsts.push_back(continues ? before : b);
+    }
+    return firsts;
   }
-  /// The reference that subvol has named a block after.
-  static std::optional<int> own_reference(const Block& block) {
+  /// The reference in the name of a block that subvol may have named.
+  static std::optional<int> named_reference(const Block& block) {
     if (!block.name.starts_with(kReferenceBlock)) return std::nullopt;
     const auto number = parse_integer(std::string_view(block.name).substr(kReferenceBlock.size()));
     if (!number || std::abs(*number) > std::numeric_limits<int>::max()) return std::nullopt;
     return static_cast<int>(*number);
   }
 
+  /// A block stands for the reference in its name, unless that is the number of another block, or in the name of
+  /// another one: two regions would become one.
   void name_references() {
     const auto is_of_cells = [](const Block& block) { return block.kind.has_value(); };
     const bool has_one = std::count_if(blocks_.begin(), blocks_.end(), is_of_cells) == 1;
+    const std::vector<std::size_t> firsts = first_blocks();
+    std::set<long long> numbers;
+    std::map<int, int> num_named;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (!blocks_[b].kind || firsts[b] != b) continue;
+      numbers.insert(blocks_[b].id);
+      if (const auto named = named_reference(blocks_[b])) ++num_named[*named];
+    }
     mesh_.references.assign(mesh_.num_cells(), 0);
-    std::set<int> named;
-    for (const Block& block : blocks_) {
+    std::set<int> named_regions;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block &block = blocks_[b], &first = blocks_[firsts[b]];
       if (!block.kind) continue;
-      const Block& first = first_of(block);
-      const std::optional<int> own = own_reference(first);
+      std::optional<int> own = named_reference(first);
+      if (own && *own != first.id && (num_named[*own] > 1 || numbers.contains(*own))) own.reset();
       if (has_one && !own && first.name.empty()) continue;  // nothing is told by a single block without a name
       const int reference = own ? *own : number_of(first.id, "eb_prop1");
       std::fill_n(mesh_.references.begin() + static_cast<std::ptrdiff_t>(block.first_cell), block.num_elements,
                   reference);
-      if (!own && !first.name.empty() && named.insert(reference).second)
+      if (!own && !first.name.empty() && named_regions.insert(reference).second)
         mesh_.regions.push_back({first.name, reference, 3});
     }
   }
@@ -361,12 +380,43 @@ class ExodusParser {
     file_.fail(where + ": there is no element " + std::to_string(element));
   }
 
-  /// Sets of the nodes of side sets say nothing new.
+  /// Sets of the nodes of side sets say nothing new: those of the same name, and those without one whose corners are
+  /// the ones of the side set of their number.
   void warn_of_node_sets() {
     const std::size_t n = count_of("num_node_sets");
-    for (const std::string& name : file_.names("ns_names", n))
-      if (name.empty() || std::find(side_names_.begin(), side_names_.end(), name) == side_names_.end())
-        left_out_.add("node sets");
+    const std::vector<std::string> names = file_.names("ns_names", n);
+    const std::vector<long long> numbers = ids("ns_prop1", file_.size_of("ns_prop1", n, 1));
+    for (std::size_t s = 0; s < n; ++s) {
+      const bool is_known = names[s].empty() ? holds_corners_of_group(s, numbers[s])
+                                             : std::ranges::find(side_names_, names[s]) != side_names_.end();
+      if (!is_known) left_out_.add("node sets");
+    }
+  }
+
+  bool holds_corners_of_group(std::size_t set, long long number) {
+    const auto& groups = mesh_.face_groups.groups;
+    const auto group =
+        std::ranges::find_if(groups, [&](const Group& other) { return other.number == number && other.name.empty(); });
+    if (group == groups.end()) return false;
+    const auto place = static_cast<Index>(group - groups.begin());
+    std::set<Index> wanted, found;
+    for (const GroupedFace& entry : mesh_.face_groups.faces)
+      if (entry.group == place)
+        for (const Index v : entry.face)
+          if (v != kNoIndex) wanted.insert(v);
+    if (is_corner_.empty()) {
+      is_corner_.assign(mesh_.positions.size(), false);
+      for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
+        for (const Index v : mesh_.cell(c).first(num_corners(mesh_.kinds[c])))
+          is_corner_[static_cast<std::size_t>(v)] = true;
+    }
+    const std::string suffix = std::to_string(set + 1);
+    const std::size_t size = count_of("num_nod_ns" + suffix);
+    if (size == 0) return wanted.empty();
+    for (const long long node : file_.integers("node_ns" + suffix, size))
+      if (node >= 1 && node <= static_cast<long long>(num_nodes_) && is_corner_[static_cast<std::size_t>(node) - 1])
+        found.insert(static_cast<Index>(node - 1));
+    return found == wanted;
   }
 
   ExodusFile file_;
@@ -375,6 +425,7 @@ class ExodusParser {
   LeftOut left_out_;
   std::vector<Block> blocks_;
   std::vector<std::string> side_names_;
+  std::vector<bool> is_corner_;  ///< of the nodes: one of a cell's corners; empty until it is asked for
   std::size_t num_nodes_ = 0;
 };
 

@@ -499,9 +499,17 @@ class InpParser {
         mesh_.regions.push_back({element_sets_.name(s), reference, 3});
       else name_region(reference, s, used);
     }
+    if (const std::size_t all = set_of_all_elements(); all != kNone) used.insert(all);  // it says nothing
     std::size_t defined = 0;
     for (std::size_t s = 0; s < element_sets_.size(); ++s) defined += element_sets_.is_defined(s);
     left_out_.add("element sets", defined - std::min(defined, used.size()));
+  }
+
+  /// The set that every *ELEMENT names; kNone if there is none.
+  std::size_t set_of_all_elements() const {
+    const std::size_t first = elements_.empty() ? kNone : elements_.front().set;
+    const bool is_of_all = std::ranges::all_of(elements_, [&](const Element& element) { return element.set == first; });
+    return is_of_all && first != kNone && element_sets_.is_defined(first) ? first : kNone;
   }
 
   /// A set that holds nothing but the set of one of our references has its name.

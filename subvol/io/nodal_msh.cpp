@@ -10,7 +10,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
 #include <optional>
+#include <set>
 #include <unordered_map>
 
 namespace subvol::internal {
@@ -350,6 +352,7 @@ class MshParser {
       return is_cell(element) && element.physical != 0;
     });
     if (std::none_of(elements_.begin(), elements_.end(), is_cell)) return build_shells();
+    find_own_references();
     NodalCells cells(mesh_);
     GroupList faces;
     std::vector<Index> nodes;
@@ -420,8 +423,8 @@ class MshParser {
         group.name = name->second;
   }
 
-  /// A group that `write_volume` has named after a reference stands for that reference.
-  std::optional<int> own_reference(int group) const {
+  /// The reference that a group's name stands for, if `write_volume` may have named it.
+  std::optional<int> named_reference(int group) const {
     constexpr std::string_view kOwn = "reference ";
     const auto name = names_[3].find(group);
     if (name == names_[3].end() || !name->second.starts_with(kOwn)) return std::nullopt;
@@ -429,12 +432,28 @@ class MshParser {
     if (!reference || std::abs(*reference) > kMostNumber) return std::nullopt;
     return static_cast<int>(*reference);
   }
-  int reference_of(int group) const { return own_reference(group).value_or(group); }
+
+  /// Finds the groups of cells that stand for the reference in their name: not one whose reference is the number of
+  /// another group, or in the name of another one, since two regions would become one.
+  void find_own_references() {
+    std::set<int> groups;
+    for (const Element& element : elements_)
+      if (dimension(element.type->shape) == 3 && element.physical != 0) groups.insert(element.physical);
+    std::map<int, int> num_named;
+    for (const int group : groups)
+      if (const auto named = named_reference(group)) ++num_named[*named];
+    for (const int group : groups)
+      if (const auto named = named_reference(group))
+        if (*named == group || (num_named[*named] == 1 && !groups.contains(*named))) own_references_[group] = *named;
+  }
+  int reference_of(int group) const {
+    const auto own = own_references_.find(group);
+    return own == own_references_.end() ? group : own->second;
+  }
 
   void name_regions() {
     for (const auto& [number, name] : names_[3])
-      if (!own_reference(number) &&
-          std::find(mesh_.references.begin(), mesh_.references.end(), number) != mesh_.references.end())
+      if (!own_references_.contains(number) && std::ranges::find(mesh_.references, number) != mesh_.references.end())
         mesh_.regions.push_back({name, number, 3});
   }
 
@@ -448,6 +467,7 @@ class MshParser {
   std::unordered_map<std::int64_t, Index> numbers_;             ///< of nodes by their tags
   std::array<std::map<int, std::string>, 4> names_;             ///< of physical groups, by dimension
   std::array<std::map<std::int64_t, std::vector<int>>, 4> physical_;  ///< groups of entities
+  std::map<int, int> own_references_;                                 ///< of groups of cells
   std::vector<Element> elements_;
   std::vector<std::int64_t> element_nodes_;
   std::size_t num_skipped_ = 0, num_more_groups_ = 0;

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 namespace subvol::internal {
 
@@ -153,11 +154,20 @@ class VtuParser {
         } catch (const InputError&) {
           numbers.values.clear();  // values such as qualities may well be nan
         }
-      ++num_arrays_;
+      num_arrays_ += !is_derived(numbers, num_cells);
       if (numbers.name == "order" && asked_ != "order") continue;  // ours: it says nothing about materials
       if (numbers.values.size() == num_cells) keep(std::move(numbers));
       else others_.push_back(described_array.name);
     }
+  }
+
+  /// Returns true for the data of a piece that subvol writes beside the references, and that follow from the cells:
+  /// their orders, and scaled Jacobians.
+  bool is_derived(const CellNumbers& numbers, std::size_t num_cells) const {
+    if (numbers.name == "scaled_jacobian") return numbers.is_real;
+    if (numbers.name != "order" || numbers.values.size() != num_cells || mesh_.orders.size() < num_cells) return false;
+    const auto of_piece = std::span(mesh_.orders).last(num_cells);
+    return std::equal(of_piece.begin(), of_piece.end(), numbers.values.begin());
   }
 
   /// Joins the arrays of one name of all pieces; those that a piece lacks are dropped in the end.

@@ -16,7 +16,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <mutex>
-#include <set>
 #endif
 
 namespace subvol::internal {
@@ -99,6 +98,17 @@ struct WrittenBlock {
   std::string name{};
 };
 
+constexpr std::size_t kLongestName = 255;   // that readers take
+constexpr std::size_t kLongestSuffix = 20;  // of a kind of cell or a number
+
+/// Cuts a name to so many bytes, not within a character.
+std::string exodus_name(std::string name, std::size_t longest = kLongestName) {
+  std::size_t end = std::min(name.size(), longest);
+  while (end > 0 && end < name.size() && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
+  name.resize(end);
+  return name;
+}
+
 std::vector<WrittenBlock> blocks_of(const NodalMesh& mesh) {
   std::vector<WrittenBlock> blocks;
   for (const std::size_t c : exodus_order(mesh)) {
@@ -108,18 +118,21 @@ std::vector<WrittenBlock> blocks_of(const NodalMesh& mesh) {
     blocks.back().cells.push_back(c);
   }
   PositiveNumbers ids(mesh.references);
-  std::set<std::string> taken;
   const WrittenBlock* first = nullptr;  // of the same reference
   for (WrittenBlock& block : blocks) {
     const bool continues = first && first->reference == block.reference;
     block.id = continues ? ids.take_free() : ids.of(block.reference);
-    block.name = std::string(kReferenceBlock) + std::to_string(block.reference);
+    const std::string number = std::to_string(block.reference), suffix = kind_suffix(block.kind);
+    if (continues) {
+      block.name = first->name + suffix;
+      continue;
+    }
+    block.name = std::string(kReferenceBlock) + number;
     for (const Group& region : mesh.regions)
-      if (region.number == block.reference && !region.name.empty() && !taken.contains(region.name))
-        block.name = region.name;
-    if (continues) block.name = first->name + kind_suffix(block.kind);
-    else first = &block;
-    taken.insert(block.name);
+      if (region.number == block.reference && !region.name.empty())
+        block.name = exodus_name(region.name, kLongestName - kLongestSuffix);
+    if (first && block.name == first->name + suffix) block.name += ' ' + number;  // it would continue that one
+    first = &block;
   }
   return blocks;
 }
@@ -138,15 +151,6 @@ std::vector<char> table_of(const std::vector<std::string>& names, std::size_t le
     std::copy_n(names[i].begin(), std::min(names[i].size(), length - 1),
                 table.begin() + static_cast<std::ptrdiff_t>(i * length));
   return table;
-}
-
-/// Cuts a name to what readers take, not within a character.
-std::string exodus_name(std::string name) {
-  constexpr std::size_t kLongest = 255;
-  std::size_t end = std::min(name.size(), kLongest);
-  while (end > 0 && end < name.size() && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
-  name.resize(end);
-  return name;
 }
 
 std::string bytes_of(const NodalMesh& mesh) {
@@ -188,7 +192,7 @@ std::string bytes_of(const NodalMesh& mesh) {
   std::vector<int> block_ids;
   for (const WrittenBlock& block : blocks) {
     block_ids.push_back(block.id);
-    block_names.push_back(exodus_name(block.name));
+    block_names.push_back(block.name);
   }
   std::size_t longest = 32;  // of names; older readers expect at least so many
   for (const auto* names : {&set_names, &block_names})

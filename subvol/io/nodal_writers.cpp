@@ -97,8 +97,11 @@ void append_inp_elements(std::string& text, const NodalMesh& mesh, int order) {
 void append_inp_references(std::string& text, const NodalMesh& mesh, SetNames& names) {
   std::map<int, std::vector<std::size_t>> cells;
   for (std::size_t c = 0; c < mesh.references.size(); ++c) cells[mesh.references[c]].push_back(c);
+  std::map<int, std::string> own_names;  // before those of regions, one of which may look like them
+  for (const auto& [reference, members] : cells)
+    own_names[reference] = names.take(numbered("REFERENCE_", reference), "");
   for (const auto& [reference, members] : cells) {
-    const std::string own = names.take(numbered("REFERENCE_", reference), "");
+    const std::string& own = own_names.at(reference);
     text += "*ELSET, ELSET=" + own + "\n";
     append_set(text, members);
     for (const Group& region : mesh.regions)
@@ -138,6 +141,21 @@ std::string nastran_field(double value) {
     if (text.find('.') == std::string::npos) text.insert(e == std::string::npos ? text.size() : e, ".");
     return text;
   });
+}
+
+/// Appends a card of whole numbers: in fields of eight columns, or of sixteen if a number does not fit.
+void append_nastran_card(std::string& text, std::string name, const std::vector<std::int64_t>& numbers) {
+  constexpr std::int64_t kMostInSmallField = 99'999'999;
+  const bool is_large = *std::max_element(numbers.begin(), numbers.end()) > kMostInSmallField;
+  const std::size_t width = is_large ? 16 : 8, fields_of_line = is_large ? 4 : 8;
+  const char mark = is_large ? '*' : '+';  // some readers take no blank as the mark of a continuation
+  if (is_large) name += mark;
+  text += padded(name, 8);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (i > 0 && i % fields_of_line == 0) ((text += mark) += '\n') += padded(std::string(1, mark), 8);
+    text += padded(std::to_string(numbers[i]), width);
+  }
+  text += '\n';
 }
 
 }  // namespace
@@ -198,17 +216,16 @@ std::string nastran_text(const NodalMesh& mesh) {
   constexpr std::array<std::size_t, 20> kHex{0,  1,  2,  3,  4,  5,  6,  7,  8,  9,
                                              10, 11, 16, 17, 18, 19, 12, 13, 14, 15};
   constexpr const char* kCards[] = {"CTETRA", "CPENTA", "CHEXA", "CPYRAM"};
+  std::vector<std::int64_t> numbers;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const CellKind kind = mesh.kinds[c];
-    text += padded(kCards[static_cast<std::size_t>(kind)], 8) + padded(std::to_string(c + 1), 8) +
-            padded(std::to_string(properties.of(reference_of(mesh, c))), 8);
+    numbers = {static_cast<std::int64_t>(c) + 1, properties.of(reference_of(mesh, c))};
     const std::size_t count = num_edge_nodes(kind, order);
     for (std::size_t i = 0; i < count; ++i) {
-      if ((i + 2) % 8 == 0) text += "+\n+       ";  // some readers take no blank as the mark of a continuation
       const std::size_t place = kind == CellKind::hex ? kHex[i] : kind == CellKind::prism ? kPrism[i] : i;
-      text += padded(std::to_string(mesh.cell(c)[place] + 1), 8);
+      numbers.push_back(std::int64_t{mesh.cell(c)[place]} + 1);
     }
-    text += '\n';
+    append_nastran_card(text, kCards[static_cast<std::size_t>(kind)], numbers);
   }
   return text + "ENDDATA\n";
 }

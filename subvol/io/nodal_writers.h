@@ -20,7 +20,8 @@ std::string inp_text(const NodalMesh& mesh);
 
 /// Returns the cells as bulk data of Nastran, with large fields: GRID, CTETRA, CPENTA, CPYRAM and CHEXA, of order 2
 /// with the middles of edges as above. The number of a property is the reference, or, for those below 1, the first free
-/// number. There are no groups of faces: they would be shells. InputError: as above.
+/// number; a card whose numbers have more than eight digits has large fields. There are no groups of faces: they would
+/// be shells. InputError: as above.
 std::string nastran_text(const NodalMesh& mesh);
 
 /// Returns the cells as an MFEM mesh v1.0, curved ones with nodes in the space H1 of their order.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes of several regions, as their users run them through the verbs.
 
+#include "cli/runs/loading.h"
 #include "subvol/export/surface_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/surface/boundary.h"
@@ -12,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include <string>
+#include <vector>
 
 using subvol::test::content_of;
 using subvol::test::Run;
@@ -27,6 +29,15 @@ subvol::VolumeMesh two_layers() {
 }
 
 }  // namespace
+
+TEST_CASE("A name that several regions have is refused with their numbers, and a number is one") {
+  const std::vector<subvol::Group> regions{{"core", 3, 3}, {"shell", 4, 3}, {"core", 5, 3}, {"4", 6, 3}};
+  CHECK(subvol::cli::number_of_region(regions, "shell", "--region") == 4);
+  CHECK(subvol::cli::number_of_region(regions, "4", "--region") == 4);
+  CHECK(subvol::cli::number_of_region(regions, "5", "--region") == 5);
+  CHECK_THROWS_WITH(subvol::cli::number_of_region(regions, "core", "--region"),
+                    Catch::Contains("--region") && Catch::Contains("3, 5") && Catch::Contains("number"));
+}
 
 TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions][slow]") {
   const Workplace place;

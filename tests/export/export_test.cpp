@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/export/export.h"
-#include "subvol/export/surface_writer.h"
 
 #include "subvol/base/error.h"
 #include "subvol/export/gltf_writer.h"
 #include "subvol/export/polygon_shading.h"
+#include "subvol/export/read_back.h"
+#include "subvol/export/surface_writer.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/io/surface_io.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
+#include "tests/support/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
@@ -253,4 +256,37 @@ TEST_CASE("A surface far from the origin is written to .stl without loss") {
   CHECK(text.find("4500000.1") != std::string::npos);
   for (Vec3& p : triangle.positions) p -= origin;
   CHECK_FALSE(surface_bytes(".stl", triangle).starts_with("solid "));
+}
+
+TEST_CASE("Coordinates beyond single precision are written to .stl as text, and come back") {
+  const TemporaryFolder folder;
+  for (const double size : {1e39, 1.0, 1e-37}) {
+    CAPTURE(size);
+    PolygonMesh triangle;
+    triangle.positions = {Vec3(0, 0, 0), Vec3(size, 0, 0), Vec3(0, size, 0)};
+    triangle.face_vertices = {0, 1, 2};
+    triangle.face_offsets = {0, 3};
+    write_surface(folder / "a.stl", triangle);
+    CHECK_NOTHROW(require_written(folder / "a.stl", triangle));
+    CHECK(surface_bytes(".stl", triangle).starts_with("solid ") == (size != 1));
+    const PolygonMesh found = read_polygon_mesh(folder / "a.stl");
+    CHECK(found.positions == triangle.positions);
+  }
+}
+
+TEST_CASE("Solids of an .stl have names of their own, also that of the faces of no group") {
+  PolygonMesh surface;
+  for (int i = 0; i < 4; ++i) {
+    surface.positions.insert(surface.positions.end(), {Vec3(i, 0, 0), Vec3(i, 1, 0), Vec3(i, 0, 1)});
+    for (int k = 0; k < 3; ++k) surface.face_vertices.push_back(3 * i + k);
+    surface.face_offsets.push_back(surface.face_vertices.size());
+  }
+  surface.face_groups = {{{"none", 1, 2}, {"wall", 2, 2}, {"wall", 3, 2}}, {1, kNoIndex, 2, 0}};
+  const TemporaryFolder folder;
+  write_surface(folder / "a.stl", surface);
+  const PolygonMesh found = read_polygon_mesh(folder / "a.stl");
+  std::vector<std::string> names;
+  for (const Group& group : found.face_groups.groups) names.push_back(group.name);
+  CHECK(names == std::vector<std::string>{"none", "wall", "wall 2", "none 2"});
+  CHECK(found.face_groups.of_face == std::vector<Index>{0, 1, 2, 3});
 }

@@ -209,6 +209,23 @@ TEST_CASE("a scene that cannot be written is refused with the name of the node a
   CHECK_THROWS_AS(write_gltf(scratch("no_such_folder") / "a.glb", two_quads()), IoError);
 }
 
+TEST_CASE("a scene beyond single precision is refused, quantized or not") {
+  for (const bool quantize : {false, true})
+    for (const double size : {5e38, 1e-38}) {
+      Scene scene = two_quads();
+      scene.quantize = quantize;
+      scene.origin = Vec3::Zero();
+      for (SceneNode& node : scene.nodes)
+        for (Vec3& p : node.primitive.positions) p *= size;
+      CAPTURE(quantize, size);
+      CHECK_THROWS_WITH(gltf_bytes(scene, GltfContainer::glb), Catch::Matchers::Contains("float32"));
+    }
+  Scene scene = two_quads();
+  scene.origin = Vec3(1e30, 0, 0);
+  scene.meters_per_unit = 1e10;
+  CHECK_THROWS_WITH(gltf_bytes(scene, GltfContainer::glb), Catch::Matchers::Contains("float32"));
+}
+
 TEST_CASE("the Khronos validator has nothing to say about the files") {
   const auto glb = scratch("scene.glb"), text = scratch("scene.gltf"), turned = scratch("turned.glb");
   Scene scene = two_quads();

@@ -179,6 +179,17 @@ TEST_CASE("A page holds its meshes, and nothing ends its data early", "[viewer]"
   CHECK_THROWS_AS(viewer_page(content), InputError);
 }
 
+TEST_CASE("A page of positions beyond single precision is refused", "[viewer]") {
+  if (!has_viewer()) return;
+  for (const double size : {1e39, 1e-38}) {
+    VolumeMesh mesh = subvol::test::lattice(1, 1, 1);
+    for (Vec3& p : mesh.positions) p *= size;
+    ViewerContent content;
+    content.meshes.push_back(viewer_mesh("cube", mesh));
+    CHECK_THROWS_WITH(viewer_page(content), Catch::Contains("float32"));
+  }
+}
+
 TEST_CASE("Surfaces and limit surfaces become what the viewer draws", "[viewer]") {
   PolygonMesh surface;
   surface.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 2, 0}};

@@ -192,6 +192,19 @@ TEST_CASE("whatever is wrong with a mesh, its check returns", "[mesh_check]") {
   CHECK_THROWS_AS(check_mesh(lattice(1, 1, 1), nullptr, {.samples_per_direction = 1}), InputError);
 }
 
+TEST_CASE("A coefficient of a curved mesh that is not finite is a defect", "[mesh_check]") {
+  const VolumeMesh mesh = lattice(2, 1, 1);
+  for (const std::size_t node : {std::size_t{3}, mesh.num_vertices() + 2}) {
+    HighOrderMesh curved(ElementSpace(mesh, Basis::legendre, 2), mesh);
+    curved.coefficients[node].y() = std::numeric_limits<double>::quiet_NaN();
+    const MeshCheck check = check_mesh(curved, CurvedBoundary{});
+    CAPTURE(node);
+    CHECK(has(check, MeshDefect::Kind::not_finite));
+    CHECK_FALSE(check.valid());
+    CHECK_FALSE(check.has_boundary_geometry);
+  }
+}
+
 TEST_CASE("A mesh whose volume no number holds is refused by its check", "[mesh_check]") {
   for (const double size : {1e41, 1e-41}) {
     VolumeMesh mesh = lattice(1, 1, 1);

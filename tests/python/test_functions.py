@@ -174,11 +174,37 @@ class Shells(InFolder):
         for thickness in ("two", "-1%", 0, -1.0, float("nan"), [0.1, 0.2], np.full(8, -1.0)):
             with self.assertRaises(subvol.InputError, msg=str(thickness)):
                 subvol.shell(cube().boundary(), thickness)
-        for thickness in (None, ["a"] * 8):
+        for thickness in (None, ["a"] * 8, True, np.bool_(True)):
             with self.assertRaises(TypeError, msg=str(thickness)):
                 subvol.shell(cube().boundary(), thickness)
         with self.assertRaises(subvol.InputError):
             subvol.shell(cube().boundary(), 0.1, layers=10**9)
+        for options in ({"layers": 0}, {"layers": 1001}, {"growth": 0.001}, {"growth": 101.0}):
+            with self.assertRaises(subvol.InputError, msg=str(options)):
+                subvol.shell(cube().boundary(), 0.1, **options)
+
+    def test_a_thickness_may_be_a_number_of_numpy(self):
+        for thickness in (np.float32(0.25), np.float64(0.25), np.array(0.25), np.full(8, 0.25), np.int64(1), 1):
+            result = subvol.shell(cube().boundary(), thickness, straight=True)
+            self.assertEqual(len(result.linear_mesh.hexes), 6, msg=repr(thickness))
+
+    def test_a_chord_out_of_range_is_refused_before_the_work(self):
+        began = []
+        for chord in (0, -1, float("nan"), 1000):
+            for work in (lambda **o: subvol.fit("torus_target.off", "torus_template.mesh", order=2, **o),
+                         lambda **o: subvol.fill("torus_target.off", **o),
+                         lambda **o: subvol.optimize(cube(), target=cube(), order=2, **o),
+                         lambda **o: subvol.shell(cube().boundary(), 0.1, **o)):
+                with self.assertRaisesRegex(subvol.InputError, "chord must be in"):
+                    work(chord=chord, progress=lambda p: began.append(p))
+        self.assertEqual(began, [])
+
+    def test_a_coefficient_that_is_not_finite_is_a_defect(self):
+        mesh = subvol.HighOrderMesh(cube(), 2)
+        mesh.coefficients[10] = np.nan
+        report = subvol.check(mesh)
+        self.assertFalse(report["valid"])
+        self.assertIn("not_finite", [defect["kind"] for defect in report["defects"]])
 
 
 class Curved(unittest.TestCase):

@@ -97,3 +97,13 @@ TEST_CASE("Corner scaled Jacobians of a shell are those that other programs comp
   }
   CHECK(shell.corner_quality.min_scaled_jacobian == Approx(least).epsilon(1e-9));
 }
+
+TEST_CASE("Groups of a shell have names of their own, whatever the names of the surface are", "[shell]") {
+  PolygonMesh patch = plane(Faces::quads);
+  patch.face_groups = {{{"outer", 1}, {"shell outer", 2}, {"shell outer 2", 3}}, std::vector<Index>(24, 0)};
+  patch.face_groups.of_face[3] = 1;
+  patch.face_groups.of_face[4] = 2;
+  CHECK(faces_by_group(make_shell(patch, {.thickness = 0.1}).mesh) ==
+        std::map<std::string, std::size_t>{
+            {"outer", 22}, {"shell outer", 1}, {"shell outer 2", 1}, {"shell outer 3", 24}, {"rim", 20}});
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What outputs lose of a mesh's groups and names, and what is said about it.
+
+#include "cli/runs/losses.h"
+#include "tests/support/grouped_meshes.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/workplace.h"
+
+#include <catch2/catch.hpp>
+
+#include <string>
+#include <vector>
+
+using namespace subvol;
+using cli::Output;
+using cli::Part;
+using subvol::test::has;
+using subvol::test::lattice;
+using subvol::test::with_floor_and_roof;
+
+namespace {
+
+std::vector<std::string> told_of_losses(const cli::Marks& marks, const std::string& file, Part part = Part::result) {
+  const std::filesystem::path path(file);
+  const Output output{.part = part, .path = path, .extension = path.extension().string()};
+  std::vector<std::string> warnings;
+  cli::warn_of_losses(marks, marks, std::vector{output}, warnings);
+  return warnings;
+}
+
+/// A block with the group "all", which holds the floor and the roof, before the group "floor", and one of no face.
+VolumeMesh block_with_nested_groups() {
+  VolumeMesh mesh = with_floor_and_roof(lattice(2, 2, 2), 2);
+  VolumeFaceGroups groups{{{"all", 21, 2}, {"floor", 22, 2}, {"none", 23, 2}}, {}};
+  for (const GroupedFace& entry : mesh.face_groups.faces) {
+    groups.faces.push_back({entry.face, 0});
+    if (entry.group == 0) groups.faces.push_back({entry.face, 1});
+  }
+  normalize(groups);
+  mesh.face_groups = groups;
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("A format with one group for each face tells which groups lose faces", "[cli]") {
+  const cli::Marks marks = cli::marks_of(block_with_nested_groups());
+  for (const std::string file : {"a.mesh", "a.mfem", "a.obj", "a.stl", "a.glb", "a.3mf"}) {
+    const std::vector<std::string> warnings = told_of_losses(marks, file);
+    CAPTURE(file);
+    REQUIRE(!warnings.empty());
+    CHECK(has(warnings.front(), file + ": "));
+    CHECK(has(warnings.front(), "\"floor\" loses all of its 4 faces"));
+    CHECK(!has(warnings.front(), "\"all\""));
+    CHECK(!has(warnings.front(), "\"none\""));
+  }
+  CHECK(has(told_of_losses(marks, "a.vtu", Part::boundary).at(0), "\"floor\" loses all"));
+  for (const std::string file : {"a.msh", "a.vtu", "a.inp", "a.e"}) {
+    CAPTURE(file);
+    CHECK(told_of_losses(marks, file).empty());
+  }
+  CHECK(told_of_losses(cli::marks_of(with_floor_and_roof(lattice(2, 2, 2), 2)), "a.mesh").empty());
+}
