@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -29,6 +30,13 @@ double volume_below(const TriangleMesh& mesh, const std::array<Index, 3>& t, con
 double area_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
   const Vec3& a = mesh.positions[t[0]];
   return 0.5 * (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm();
+}
+
+/// Returns the place of a region in the surface's list, which is sorted by number.
+std::size_t place_of(const RegionSurface& surface, int region) {
+  const auto at = std::ranges::lower_bound(surface.regions, region, {}, &Group::number);
+  assert(at != surface.regions.end() && at->number == region);
+  return static_cast<std::size_t>(at - surface.regions.begin());
 }
 
 /// Drops all but the first of triangles with the same corners. Returns 1 for those kept of which there were several.
@@ -384,18 +392,21 @@ std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRul
 
 void orient_sheets(RegionSurface& surface) {
   surface.volumes.assign(surface.regions.size(), 0.0);
-  if (surface.mesh.triangles.empty()) return;
-  const Vec3 origin = surface.mesh.positions[surface.mesh.triangles[0][0]];
+  // Each region has an origin of its own: seen from a distant one, its volume would be lost to rounding.
+  std::vector<Index> origins(surface.regions.size(), kNoIndex);
   for (std::size_t t = 0; t < surface.sides.size(); ++t) {
     auto& [behind, front] = surface.sides[t];
     if (behind == kOutside || (front != kOutside && front < behind)) {
       std::swap(behind, front);
       std::swap(surface.mesh.triangles[t][1], surface.mesh.triangles[t][2]);
     }
-    const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
-    for (std::size_t r = 0; r < surface.regions.size(); ++r) {
-      if (surface.regions[r].number == behind) surface.volumes[r] += below;
-      if (surface.regions[r].number == front) surface.volumes[r] -= below;
+    for (const int region : surface.sides[t]) {
+      if (region == kOutside) continue;
+      const std::size_t r = place_of(surface, region);
+      if (origins[r] == kNoIndex) origins[r] = surface.mesh.triangles[t][0];
+      const Vec3& origin = surface.mesh.positions[origins[r]];
+      const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
+      surface.volumes[r] += region == behind ? below : -below;
     }
   }
 }

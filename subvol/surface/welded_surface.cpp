@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/welded_surface.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 
 #include <Eigen/Geometry>
@@ -157,11 +158,19 @@ bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 }
 
 double signed_volume_of(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return 0;
-  const Vec3 origin = mesh.positions[mesh.triangles[0][0]];
+  DisjointSets parts(mesh.positions.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    parts.join(a, b);
+    parts.join(a, c);
+  }
+  std::vector<Index> origins(mesh.positions.size(), kNoIndex);  // of the part that a vertex is the least of
   double sum = 0;
-  for (const auto& t : mesh.triangles)
+  for (const auto& t : mesh.triangles) {
+    Index& first = origins[parts.of(t[0])];
+    if (first == kNoIndex) first = t[0];
+    const Vec3& origin = mesh.positions[first];
     sum += (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
+  }
   return sum / 6;
 }
 

@@ -67,8 +67,8 @@ void for_each_edge(std::span<const SurfaceHalfEdge> half_edges, Visit&& visit) {
 bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, bool outward,
                       std::vector<std::array<std::size_t, 2>>& pairs);
 
-/// Returns 1/6 sum of det(a, b, c) over the triangles, relative to their first corner: the volume that a closed surface
-/// encloses, negative if its normals point inward.
+/// Returns 1/6 sum of det(a, b, c) over the triangles, relative to the first corner of their part: the volume that a
+/// closed surface encloses, negative if its normals point inward. Parts are connected by vertices.
 double signed_volume_of(const TriangleMesh& mesh);
 
 }  // namespace subvol::internal

@@ -2,6 +2,7 @@
 #include "subvol/surface/region_surface.h"
 
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/welded_surface.h"
 #include "tests/support/region_fixtures.h"
 #include "tests/support/sample_meshes.h"
 
@@ -139,4 +140,17 @@ TEST_CASE("Regions get the names of groups that bound them alone", "[regions]") 
   const auto found = find_regions(surface);
   REQUIRE(found);
   CHECK(found->regions == std::vector<Group>{{"shell", 1, 3}, {"core", 2, 3}});
+}
+
+TEST_CASE("Regions that lie far apart have their own volumes", "[regions]") {
+  for (const double distance : {1e5, 1e7, 1e9}) {
+    TriangleMesh far = test::slabs_surface(2);
+    for (Vec3& p : far.positions) p += distance * Vec3(0.57, -0.61, 0.49);
+    const TriangleMesh both = together(test::slabs_surface(2), far);
+    const auto found = find_regions(both);
+    REQUIRE(found);
+    REQUIRE(found->volumes.size() == 4);
+    for (const double volume : found->volumes) CHECK(volume == Approx(0.5).epsilon(1e-6));
+    CHECK(internal::signed_volume_of(together(box_surface({0, 0, 0}, {1, 1, 1}), far)) > 0);
+  }
 }
