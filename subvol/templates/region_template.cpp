@@ -72,7 +72,6 @@ class RegionSearch {
   std::optional<LabeledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
   std::optional<LabeledGrid> best_of_cubes(double cells, double most_cells);
   std::optional<LabeledGrid> labeled(VoxelGrid grid, double cells, bool is_exact);
-  VoxelGrid cubes(const Mat3& frame, double size, double offset) const;
   double size_for(double cells, bool counts_pillow) const;
   double count_of(const VoxelLabels& labels, bool counts_pillow) const;
   RegionTemplate finished(const LabeledGrid& candidate, std::size_t cells) const;
@@ -85,6 +84,7 @@ class RegionSearch {
   std::vector<double> areas_;     ///< of the boundaries of regions
   double area_ = 0, volume_ = 0;  ///< sums
   std::vector<std::size_t> misses_;  ///< by region
+  std::size_t num_grids_ = 0;        ///< that were labeled
   double fraction_ = 0;
   SearchStop stop_;
 };
@@ -114,27 +114,12 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
   return static_cast<double>(count);
 }
 
-VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) const {
-  Eigen::AlignedBox3d box;
-  for (const auto& t : surface_.mesh.triangles)
-    for (const Index v : t) box.extend(Vec3(frame.transpose() * surface_.mesh.positions[v]));
-  const Eigen::Array3d counts = (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
-  VoxelGrid grid;
-  Vec3 low = box.center();
-  for (int a = 0; a < 3; ++a) {
-    grid.cells[static_cast<std::size_t>(a)] = static_cast<int>(counts[a]);
-    low[a] -= size * (counts[a] / 2.0 + offset);
-  }
-  grid.edges = size * frame;
-  grid.origin = frame * low;
-  return grid;
-}
-
 /// Labels a grid. Returns nothing if its regions cannot be made right.
 std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
   constexpr int kWeightRounds = 5;
   constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
   const auto num_regions = static_cast<int>(surface_.regions.size());
+  ++num_grids_;
   LabelFractions fractions(static_cast<std::size_t>(num_regions) + 1);
   ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic)
@@ -185,7 +170,7 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
       if (!wanted_.sheets.contains(pair))
         for (std::size_t r = 0; r < is_wrong.size(); ++r) {
           const auto touches = [&](int other) {
-            const auto [low, high] = std::minmax(static_cast<int>(r) + 1, other);
+            const auto [low, high] = std::minmax({static_cast<int>(r) + 1, other});
             return wanted_.sheets.contains({low, high});
           };
           if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
@@ -248,19 +233,22 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
+  const auto labeled_cubes = [&](const Mat3& frame, double size, double offset) -> std::optional<LabeledGrid> {
+    const Eigen::AlignedBox3d box = box_in(frame, surface_.mesh);
+    if (!(cells_around(box, size).prod() <= most_cells)) return std::nullopt;
+    return labeled(grid_around(frame, box, size, Vec3::Constant(offset)), cells, false);
+  };
   double size = size_for(cells, options_.for_pillow);
   std::optional<LabeledGrid> best;
   for (const double factor : kSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
-        VoxelGrid grid = cubes(frame, factor * size, offset);
-        if (static_cast<double>(grid.num_cells()) > most_cells) continue;
-        std::optional<LabeledGrid> found = labeled(std::move(grid), cells, false);
+        std::optional<LabeledGrid> found = labeled_cubes(frame, factor * size, offset);
         if (!found) continue;
         if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
           const double corrected = size * std::cbrt(found->share);
-          found = labeled(cubes(frame, factor * corrected, offset), cells, false);
+          found = labeled_cubes(frame, factor * corrected, offset);
           if (found) size = corrected;
         }
         if (found && (!best || is_better(*found, *best))) best = std::move(found);
@@ -305,6 +293,7 @@ RegionTemplateResult RegionSearch::run() {
       result.cancelled = true;
       return result;
     }
+    if (num_grids_ == 0) throw too_sparse(options_.cells, most_cells);
     if (found && (!best || is_better(*found, *best))) {
       best = std::move(found);
       asked = static_cast<std::size_t>(std::lround(cells));

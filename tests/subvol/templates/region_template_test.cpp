@@ -103,3 +103,15 @@ TEST_CASE("Templates with regions can be cancelled, and refuse senseless counts"
   CHECK(region_template(*surface, {300, false, [](double) { return false; }}).cancelled);
   CHECK_THROWS_AS(region_template(*surface, {2, false, {}}), InputError);
 }
+
+TEST_CASE("Regions that are too far apart for any grid are refused", "[regions][templates]") {
+  for (const double distance : {1e4, 1e9}) {
+    TriangleMesh far = test::slabs_surface(2);
+    for (Vec3& p : far.positions) p += Vec3::Constant(distance);
+    const auto surface = find_regions(together(test::slabs_surface(2), far));
+    REQUIRE(surface);
+    REQUIRE(surface->regions.size() == 4);
+    CHECK_THROWS_WITH(region_template(*surface, {100, false, {}}), Catch::Contains("far apart"));
+    CHECK_THROWS_WITH(region_template(*surface, {100, true, {}}), Catch::Contains("far apart"));
+  }
+}
