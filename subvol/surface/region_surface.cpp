@@ -75,18 +75,8 @@ struct EdgeFan {
 };
 
 EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
-  const Vec3& from = mesh.positions[sides[0].low];
-  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
-  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    const auto& t = mesh.triangles[sides[i].triangle];
-    const Vec3 across = mesh.positions[t[0] + t[1] + t[2] - sides[i].low - sides[i].high] - from;
-    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
-  }
-  std::sort(order.begin(), order.end());
   EdgeFan fan;
-  for (const auto& [angle, i] : order) {
+  for (const auto& [angle, i] : sorted_around_edge(mesh, sides)) {
     fan.triangles.push_back(sides[i].triangle);
     fan.faces_next.push_back(sides[i].forward);  // its normal is on the side of larger angles
   }
@@ -118,6 +108,12 @@ class RegionFinder {
   struct Cell {
     Index side;             ///< the least of its sides
     double volume = 0;      ///< signed: negative for the one around the part
+    double area = 0;
+    /// Returns true if the cell encloses more than rounding.
+    bool has_volume() const {
+      constexpr double kFlat = 1e-9;
+      return volume > kFlat * area * std::sqrt(area);
+    }
     std::vector<Index> sides;
   };
   struct Part {
@@ -132,12 +128,12 @@ class RegionFinder {
 
   bool is_manifold(std::size_t part) const { return !parts_with_cells_[part].has_curves; }
 
-  /// Returns false if an edge has only one triangle.
+  /// Returns false if an edge has only one triangle, or if triangles lie on each other there.
   bool join_around_edges() {
     const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh_.triangles, mesh_.positions.size());
     bool closed = true;
     for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
-      if (edge.size() < 2) closed = false;
+      if (edge.size() < 2 || !contacts_at_edge(mesh_, edge).empty()) closed = false;
       if (edge.size() > 2) curve_triangles_.push_back(edge[0].triangle);
       if (!closed) return;
       const EdgeFan fan = sorted_around(mesh_, edge);
@@ -166,14 +162,16 @@ class RegionFinder {
       const Vec3& origin = mesh_.positions[mesh_.triangles[static_cast<std::size_t>(part.triangles[0])][0]];
       const double below = volume_below(mesh_, mesh_.triangles[t], origin) / 6;
       part.own_volume += below;
+      const double area = area_of(mesh_, mesh_.triangles[t]);
       for (const std::size_t side : {2 * t, 2 * t + 1}) {
         const auto first = static_cast<std::size_t>(cells_.of(static_cast<Index>(side)));
         if (first == side) {
           cell_of[side] = cells_of_parts_.size();
           part.cells.push_back(cells_of_parts_.size());
-          cells_of_parts_.push_back({static_cast<Index>(side), 0, {}});
+          cells_of_parts_.push_back({static_cast<Index>(side), 0, 0, {}});
         }
         Cell& cell = cells_of_parts_[cell_of[first]];
+        cell.area += area;
         cell.volume += side == 2 * t ? below : -below;  // what is behind a triangle has it as its outer side
         cell.sides.push_back(static_cast<Index>(side));
       }
@@ -206,7 +204,7 @@ class RegionFinder {
       if (candidates.empty()) continue;
       for (const std::size_t c : parts_with_cells_[around].cells) {
         const Cell& cell = cells_of_parts_[c];
-        if (c == parts_with_cells_[around].outer || !(cell.volume > 0)) continue;
+        if (c == parts_with_cells_[around].outer || !cell.has_volume()) continue;
         const WindingNumber winding(boundary_of(cell));
         for (const std::size_t k : candidates) {
           Part& part = parts_with_cells_[k];
@@ -266,7 +264,7 @@ class RegionFinder {
         root_facing[p] = is_manifold(p) && facing(part) < -kMostly ? -1 : 1;
       }
       for (const std::size_t c : part.cells)
-        if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].volume > 0;
+        if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].has_volume();
     }
     region_of_side_.assign(2 * mesh_.triangles.size(), kOutside);
     std::vector<std::size_t> cell_of(2 * mesh_.triangles.size());

@@ -59,7 +59,9 @@ const char* to_string(RegionRule rule);
 /// bound it, and are half or more of its boundary by area.
 ///
 /// surface  orientation does not matter but for the rule above.
-/// returns  nothing if there are no two regions that share a triangle; or if an edge has only one triangle.
+/// returns  nothing if there are no two regions that share a triangle; if an edge has only one triangle; or if at an
+///          edge of more than two, triangles lie on each other up to rounding (`contacts_at_edge`). What encloses no
+///          volume up to rounding is no region.
 /// InputError: a vertex number out of range, a position that is not finite.
 /// Cost: sorts of vertices and edges; of parts inside others, that of winding numbers.
 std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule = RegionRule::automatic);

@@ -3,8 +3,10 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace subvol::internal {
@@ -54,6 +56,16 @@ void for_each_edge(std::span<const SurfaceHalfEdge> half_edges, Visit&& visit) {
     visit(half_edges.subspan(first, last - first));
   }
 }
+
+/// Returns the angle of each triangle around an edge, and the position of its side in `sides`, ascending.
+/// sides  the sides of one edge.
+std::vector<std::pair<double, std::size_t>> sorted_around_edge(const TriangleMesh& mesh,
+                                                               std::span<const SurfaceHalfEdge> sides);
+
+/// Returns the pairs of triangles, smaller number first, that lie on each other at an edge of more than two: their
+/// angles around it are equal up to rounding, and their third corners are different ones.
+/// sides  the sides of one edge.
+std::vector<std::array<Index, 2>> contacts_at_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides);
 
 /// Pairs the sides at an edge of more than two triangles, such that solids that only touch there stay apart.
 ///

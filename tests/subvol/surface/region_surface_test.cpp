@@ -154,3 +154,12 @@ TEST_CASE("Regions that lie far apart have their own volumes", "[regions]") {
     CHECK(internal::signed_volume_of(together(box_surface({0, 0, 0}, {1, 1, 1}), far)) > 0);
   }
 }
+
+TEST_CASE("What has no volume up to rounding is no region", "[regions]") {
+  TriangleMesh slabs = test::slabs_surface(4);
+  for (Vec3& p : slabs.positions)
+    if (p.z() == 0.75) p.z() = 0.5 + 1e-13;
+  const auto found = find_regions(slabs);
+  REQUIRE(found);
+  CHECK(are(found->volumes, {0.25, 0.25, 0.5}));
+}
