@@ -183,32 +183,43 @@ bool VoxelLabels::is_simple(Index cell, int label) {
   return true;
 }
 
+void VoxelLabels::flood(Index seed, int number, std::vector<int>& component, std::vector<Index>& stack) const {
+  const int label = labels_[seed];
+  stack.assign(1, seed);
+  component[seed] = number;
+  while (!stack.empty()) {
+    const Index c = stack.back();
+    stack.pop_back();
+    std::array<bool, 6> there{true, true, true, true, true, true};
+    if (!frame_.may_flip(c)) {
+      const int i = c % cells_[0], j = c / cells_[0] % cells_[1], k = c / cells_[0] / cells_[1];
+      there = {i > 0, i + 1 < cells_[0], j > 0, j + 1 < cells_[1], k > 0, k + 1 < cells_[2]};
+    }
+    for (std::size_t f = 0; f < 6; ++f) {
+      if (!there[f]) continue;
+      const Index other = c + frame_.face_offsets()[f];
+      if (component[other] >= 0 || labels_[other] != label) continue;
+      component[other] = number;
+      stack.push_back(other);
+    }
+  }
+}
+
 int VoxelLabels::components(int label, std::vector<int>& component) const {
   component.assign(labels_.size(), -1);
   std::vector<Index> stack;
   int count = 0;
-  for (std::size_t seed = 0; seed < labels_.size(); ++seed) {
-    if (component[seed] >= 0 || labels_[seed] != label) continue;
-    stack.assign(1, static_cast<Index>(seed));
-    component[seed] = count;
-    while (!stack.empty()) {
-      const Index c = stack.back();
-      stack.pop_back();
-      std::array<bool, 6> there{true, true, true, true, true, true};
-      if (!frame_.may_flip(c)) {
-        const int i = c % cells_[0], j = c / cells_[0] % cells_[1], k = c / cells_[0] / cells_[1];
-        there = {i > 0, i + 1 < cells_[0], j > 0, j + 1 < cells_[1], k > 0, k + 1 < cells_[2]};
-      }
-      for (std::size_t f = 0; f < 6; ++f) {
-        if (!there[f]) continue;
-        const Index other = c + frame_.face_offsets()[f];
-        if (component[other] >= 0 || labels_[other] != label) continue;
-        component[other] = count;
-        stack.push_back(other);
-      }
-    }
-    ++count;
-  }
+  for (std::size_t seed = 0; seed < labels_.size(); ++seed)
+    if (component[seed] < 0 && labels_[seed] == label) flood(static_cast<Index>(seed), count++, component, stack);
+  return count;
+}
+
+int VoxelLabels::components(std::vector<int>& component) const {
+  component.assign(labels_.size(), -1);
+  std::vector<Index> stack;
+  int count = 0;
+  for (std::size_t seed = 0; seed < labels_.size(); ++seed)
+    if (component[seed] < 0) flood(static_cast<Index>(seed), count++, component, stack);
   return count;
 }
 

@@ -66,10 +66,15 @@ class VoxelLabels {
 
   /// Numbers the face-connected components of the cells with a label; -1 for others. Returns their number.
   int components(int label, std::vector<int>& component) const;
+  /// Numbers those of all labels.
+  int components(std::vector<int>& component) const;
   /// All points must be good.
   RegionTopology topology() const;
 
  private:
+  /// Gives a number to the cells that are connected with one, and have its label. stack: for its own use.
+  void flood(Index seed, int number, std::vector<int>& component, std::vector<Index>& stack) const;
+
   std::array<int, 3> cells_;
   int num_regions_;
   const std::array<bool, 256>*region_table_, *outside_table_;
