@@ -13,7 +13,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 
 namespace subvol {
@@ -107,6 +109,7 @@ class RegionFinder {
   /// A component of space as far as one part of the surface tells.
   struct Cell {
     Index side;             ///< the least of its sides
+    std::size_t part = 0;
     double volume = 0;      ///< signed: negative for the one around the part
     double area = 0;
     /// Returns true if the cell encloses more than rounding.
@@ -168,7 +171,7 @@ class RegionFinder {
         if (first == side) {
           cell_of[side] = cells_of_parts_.size();
           part.cells.push_back(cells_of_parts_.size());
-          cells_of_parts_.push_back({static_cast<Index>(side), 0, 0, {}});
+          cells_of_parts_.push_back({static_cast<Index>(side), part_of[t], 0, 0, {}});
         }
         Cell& cell = cells_of_parts_[cell_of[first]];
         cell.area += area;
@@ -232,11 +235,6 @@ class RegionFinder {
     return std::ranges::all_of(part.triangles, [&](Index t) { return has_copy_[t] != 0; });
   }
 
-  std::size_t part_of_cell(std::size_t cell) const {
-    for (std::size_t p = 0;; ++p)
-      if (std::ranges::find(parts_with_cells_[p].cells, cell) != parts_with_cells_[p].cells.end()) return p;
-  }
-
   void number_regions() {
     constexpr double kMostly = 0.5;
     // Parts that contain others come first.
@@ -253,7 +251,7 @@ class RegionFinder {
       const Part& part = parts_with_cells_[p];
       bool is_void = false;
       if (part.inside) {
-        const std::size_t parent = part_of_cell(*part.inside);
+        const std::size_t parent = cells_of_parts_[*part.inside].part;
         root_facing[p] = root_facing[parent];
         joined[part.outer] = joined[*part.inside];
         const bool in_region = is_region[joined[*part.inside]] != 0;
@@ -313,28 +311,30 @@ class RegionFinder {
   /// Gives regions the names of groups that bound them.
   static void name_regions(RegionSurface& surface) {
     constexpr double kMost = 0.5;
+    constexpr double kAll = 1 - 1e-9;
     const auto& groups = surface.mesh.face_groups;
-    for (std::size_t g = 0; g < groups.groups.size(); ++g) {
-      double area = 0;
-      std::vector<double> shared(surface.regions.size(), 0.0);
-      for (std::size_t t = 0; t < surface.sides.size(); ++t) {
-        if (groups.of_face[t] != static_cast<Index>(g)) continue;
-        const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
-        area += one;
-        for (const int side : surface.sides[t])
-          if (side != kOutside) shared[static_cast<std::size_t>(side - 1)] += one;
+    if (groups.empty()) return;
+    std::vector<double> of_group(groups.groups.size(), 0.0), of_region(surface.regions.size(), 0.0);
+    std::map<std::pair<Index, std::size_t>, double> shared;  // by group and region
+    for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+      const Index g = groups.of_face[t];
+      const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
+      if (g != kNoIndex) of_group[g] += one;
+      for (const int side : surface.sides[t]) {
+        if (side == kOutside) continue;
+        const std::size_t r = place_of(surface, side);
+        of_region[r] += one;
+        if (g != kNoIndex) shared[{g, r}] += one;
       }
-      for (std::size_t r = 0; r < shared.size(); ++r) {
-        double whole = 0;
-        for (std::size_t t = 0; t < surface.sides.size(); ++t)
-          for (const int side : surface.sides[t])
-            if (side == surface.regions[r].number) whole += area_of(surface.mesh, surface.mesh.triangles[t]);
-        constexpr double kAll = 1 - 1e-9;
-        if (surface.regions[r].name.empty() && area > 0 && shared[r] >= kAll * area && area >= kMost * whole) {
-          surface.regions[r].name = groups.groups[g].name;
-          break;
-        }
-      }
+    }
+    Index named = kNoIndex;  // the last group whose name was given
+    for (const auto& [key, area] : shared) {
+      const auto& [g, r] = key;
+      std::string& name = surface.regions[r].name;
+      if (g == named || !name.empty() || !(of_group[g] > 0)) continue;
+      if (area < kAll * of_group[g] || of_group[g] < kMost * of_region[r]) continue;
+      name = groups.groups[g].name;
+      named = g;
     }
   }
 
@@ -368,6 +368,24 @@ TriangleMesh selected(const TriangleMesh& mesh, std::span<const Index> triangles
     if (!mesh.face_groups.empty()) result.face_groups.of_face.push_back(mesh.face_groups.of_face[t]);
   }
   return result;
+}
+
+/// Returns the boundary of a region, given its triangles.
+TriangleMesh boundary_of(const RegionSurface& surface, int region, std::span<const Index> triangles) {
+  std::vector<Index> used;
+  for (const Index t : triangles)
+    used.insert(used.end(), surface.mesh.triangles[t].begin(), surface.mesh.triangles[t].end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  TriangleMesh boundary;
+  for (const Index v : used) boundary.positions.push_back(surface.mesh.positions[v]);
+  for (const Index t : triangles) {
+    std::array<Index, 3> corners = surface.mesh.triangles[t];
+    for (Index& v : corners) v = static_cast<Index>(std::ranges::lower_bound(used, v) - used.begin());
+    if (surface.sides[t][1] == region) std::swap(corners[1], corners[2]);
+    boundary.triangles.push_back(corners);
+  }
+  return boundary;
 }
 
 }  // namespace
@@ -451,15 +469,22 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh) {
 }
 
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region) {
-  TriangleMesh boundary{surface.mesh.positions, {}};
-  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
-    const auto& [behind, front] = surface.sides[t];
-    if (behind != region && front != region) continue;
-    std::array<Index, 3> corners = surface.mesh.triangles[t];
-    if (front == region) std::swap(corners[1], corners[2]);
-    boundary.triangles.push_back(corners);
-  }
-  return boundary;
+  std::vector<Index> triangles;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    if (std::ranges::find(surface.sides[t], region) != surface.sides[t].end())
+      triangles.push_back(static_cast<Index>(t));
+  return boundary_of(surface, region, triangles);
+}
+
+std::vector<TriangleMesh> boundaries_of_regions(const RegionSurface& surface) {
+  std::vector<std::vector<Index>> triangles(surface.regions.size());
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    for (const int side : surface.sides[t])
+      if (side != kOutside) triangles[place_of(surface, side)].push_back(static_cast<Index>(t));
+  std::vector<TriangleMesh> boundaries;
+  for (std::size_t r = 0; r < triangles.size(); ++r)
+    boundaries.push_back(boundary_of(surface, surface.regions[r].number, triangles[r]));
+  return boundaries;
 }
 
 TriangleMesh outer_surface(const RegionSurface& surface) {

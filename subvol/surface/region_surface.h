@@ -70,8 +70,12 @@ std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRul
 /// references as numbers, and their names; if a reference is not positive, they are numbered from 1 on instead.
 RegionSurface surface_of_regions(const VolumeMesh& mesh);
 
-/// Returns the closed boundary of a region, oriented outward, without groups; vertices are numbered as in the surface.
+/// Returns the closed boundary of a region, oriented outward, without groups; and the vertices that it names, in the
+/// surface's order.
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region);
+
+/// Returns the same for each of `RegionSurface::regions`. Cost: almost linear.
+std::vector<TriangleMesh> boundaries_of_regions(const RegionSurface& surface);
 
 /// Returns the triangles between regions and the outside, oriented outward, with their groups, and without vertices
 /// that they do not name.

@@ -56,9 +56,9 @@ class RegionSearch {
         options_(options),
         wanted_(topology_of(surface)),
         stop_([this] { return !options_.progress || options_.progress(fraction_); }) {
-    for (const Group& region : surface.regions) {
-      boundaries_.push_back(boundary_of_region(surface, region.number));
-      areas_.push_back(area_of(boundaries_.back()));
+    boundaries_ = boundaries_of_regions(surface);
+    for (const TriangleMesh& boundary : boundaries_) {
+      areas_.push_back(area_of(boundary));
       area_ += areas_.back();
     }
     for (const double volume : surface.volumes) volume_ += volume;

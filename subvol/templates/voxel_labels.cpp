@@ -102,9 +102,10 @@ std::map<std::array<int, 2>, SheetTopology> topology_of_sheets(std::span<const s
 RegionTopology topology_of(const RegionSurface& surface) {
   RegionTopology result;
   std::map<int, int> place{{kOutside, 0}};
-  for (const Group& region : surface.regions) {
-    result.regions.push_back(solid_boundary(boundary_of_region(surface, region.number)).topology);
-    place[region.number] = static_cast<int>(result.regions.size());
+  const std::vector<TriangleMesh> boundaries = boundaries_of_regions(surface);
+  for (std::size_t r = 0; r < boundaries.size(); ++r) {
+    result.regions.push_back(solid_boundary(boundaries[r]).topology);
+    place[surface.regions[r].number] = static_cast<int>(result.regions.size());
   }
   std::vector<std::array<Index, 4>> faces;
   std::vector<std::array<int, 2>> keys;
