@@ -54,8 +54,8 @@ class RegionSearch {
   RegionSearch(const RegionSurface& surface, const RegionTemplateOptions& options)
       : surface_(surface),
         options_(options),
-        wanted_(topology_of(surface)),
-        stop_([this] { return !options_.progress || options_.progress(fraction_); }) {
+        stop_([this] { return !options_.progress || options_.progress(fraction_); }),
+        wanted_(topology_of(surface, &stop_)) {
     boundaries_ = boundaries_of_regions(surface);
     for (const TriangleMesh& boundary : boundaries_) {
       areas_.push_back(area_of(boundary));
@@ -78,6 +78,8 @@ class RegionSearch {
 
   const RegionSurface& surface_;
   const RegionTemplateOptions& options_;
+  double fraction_ = 0;
+  SearchStop stop_;
   RegionTopology wanted_;
   int voids_ = 1;
   std::vector<TriangleMesh> boundaries_;
@@ -85,8 +87,6 @@ class RegionSearch {
   double area_ = 0, volume_ = 0;  ///< sums
   std::vector<std::size_t> misses_;  ///< by region
   std::size_t num_grids_ = 0;        ///< that were labeled
-  double fraction_ = 0;
-  SearchStop stop_;
 };
 
 /// Returns the edge length for which volume / size^3 cells, and a layer of cells on the sheets' sides, are as many as
@@ -116,7 +116,7 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
 
 /// Labels a grid. Returns nothing if its regions cannot be made right.
 std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
-  constexpr int kWeightRounds = 5;
+  constexpr int kWeightRounds = 5, kLinesOfCell = 4;
   constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
   const auto num_regions = static_cast<int>(surface_.regions.size());
   ++num_grids_;
@@ -124,8 +124,9 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
   ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic)
   for (int r = 0; r < num_regions; ++r)
-    errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid); });
+    errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid, kLinesOfCell, &stop_); });
   errors.rethrow();
+  if (stop_.is_stopped()) return std::nullopt;
   fractions[0].assign(grid.num_cells(), 1.0);
   for (int r = 1; r <= num_regions; ++r)
     for (std::size_t c = 0; c < grid.num_cells(); ++c)
@@ -144,7 +145,8 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
     RegionTopology found;
     if (assigned) {
       evolve(labels, fractions, &stop_);
-      found = labels.topology();
+      found = labels.topology(&stop_);
+      if (stop_.is_stopped()) return std::nullopt;
     }
     bool all_right = assigned;
     for (std::size_t r = 0; r < is_wrong.size(); ++r) {
@@ -279,6 +281,10 @@ RegionTemplateResult RegionSearch::run() {
   constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
   const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
   RegionTemplateResult result;
+  if (stop_.is_stopped()) {  // the topology is not known then
+    result.cancelled = true;
+    return result;
+  }
   std::optional<LabeledGrid> best;
   std::size_t asked = 0;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {

@@ -99,11 +99,12 @@ std::map<std::array<int, 2>, SheetTopology> topology_of_sheets(std::span<const s
   return result;
 }
 
-RegionTopology topology_of(const RegionSurface& surface) {
+RegionTopology topology_of(const RegionSurface& surface, SearchStop* stop) {
   RegionTopology result;
   std::map<int, int> place{{kOutside, 0}};
   const std::vector<TriangleMesh> boundaries = boundaries_of_regions(surface);
   for (std::size_t r = 0; r < boundaries.size(); ++r) {
+    if (is_stopped(stop)) return result;
     result.regions.push_back(solid_boundary(boundaries[r]).topology);
     place[surface.regions[r].number] = static_cast<int>(result.regions.size());
   }
@@ -224,9 +225,10 @@ int VoxelLabels::components(std::vector<int>& component) const {
   return count;
 }
 
-RegionTopology VoxelLabels::topology() const {
+RegionTopology VoxelLabels::topology(SearchStop* stop) const {
   RegionTopology result;
   for (int r = 1; r <= num_regions_; ++r) {
+    if (is_stopped(stop)) return result;
     VoxelSolid solid(cells_, VertexRule::manifold);
     for (std::size_t c = 0; c < labels_.size(); ++c)
       if (labels_[c] == r) solid.flip(static_cast<Index>(c));
@@ -291,6 +293,8 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
                    const RegionTopology& wanted, int voids, SearchStop* stop) {
   constexpr int kRounds = 4;
   for (std::size_t i = 0; i < labels.num_cells(); ++i) {
+    constexpr std::size_t kBetween = 64;  // cells: there may be thousands of regions
+    if (i % kBetween == 0 && is_stopped(stop)) return false;
     const auto c = static_cast<Index>(i);
     if (!labels.may_set(c)) continue;
     double sum = 0, largest = 0;
@@ -308,7 +312,9 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
     if (!make_points_good(labels, share_of, changes, stop)) return false;
     bool changed = false;
     for (int r = 1; r <= labels.num_regions(); ++r)
-      if (!drop_surplus(labels, r, wanted.regions[static_cast<std::size_t>(r - 1)].components, changed)) return false;
+      if (is_stopped(stop) ||
+          !drop_surplus(labels, r, wanted.regions[static_cast<std::size_t>(r - 1)].components, changed))
+        return false;
     if (!drop_surplus(labels, kOutside, voids, changed)) return false;
     if (!changed) return true;
   }
