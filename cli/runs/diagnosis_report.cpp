@@ -164,7 +164,8 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
   LabelGrid grid = read_label_grid(path);
   if (rule == RegionRule::merge)
     for (int& label : grid.labels) label = std::min(label, 1);
-  RegionSurface surface = surface_of_labels(grid);
+  RegionSurface surface = surface_of_labels(grid, {.cancelled = interrupted});
+  if (surface.regions.empty()) throw EndedEarly(path.string() + ": interrupted; nothing was written", kInterrupted);
   SurfaceRepair loaded;
   for (const std::string& note : surface.notes) loaded.notes.push_back("target: " + note);
   if (surface.regions.size() > 1) {

@@ -31,18 +31,20 @@ std::string PartUnion::text_of(const Meeting& meeting) const {
 bool PartUnion::group() {
   const SelfIntersections found = self_intersections(mesh(), cancelled_);
   if (cancelled_ && cancelled_()) return false;
-  for (const auto& [t, s] : found.pairs) {
+  const auto join = [&](Index t, Index s, bool is_contact) {
     const auto a = static_cast<std::size_t>(parts_.part[t]), b = static_cast<std::size_t>(parts_.part[s]);
-    if (root(a) == root(b) || !parts_.is_closed[a] || !parts_.is_closed[b]) continue;
+    if (root(a) == root(b) || !parts_.is_closed[a] || !parts_.is_closed[b]) return;
     const auto corners = [&](Index triangle) {
       const auto& [i, j, k] = mesh().triangles[triangle];
       return std::array<Vec3, 3>{mesh().positions[i], mesh().positions[j], mesh().positions[k]};
     };
     const TriangleMeeting meeting = meeting_of(corners(t), corners(s));
-    if (meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) continue;
+    if (!is_contact && meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) return;
     meetings_.push_back({a, b, meeting.place});
     group_[std::max(root(a), root(b))] = std::min(root(a), root(b));
-  }
+  };
+  for (const auto& [t, s] : found.pairs) join(t, s, false);
+  for (const auto& [t, s] : edge_contacts(parts_)) join(t, s, true);
   return true;
 }
 

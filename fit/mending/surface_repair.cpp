@@ -67,7 +67,8 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
           words(diagnosis.find(SurfaceFault::crossing) ? SurfaceFault::crossing : SurfaceFault::face_contact)
               .substr(std::string("target: ").size()) +
           ": sheets must meet along edges that they share. A wrap makes one region of such a surface");
-    if (!regions) throw InputError(sheets + ", but an edge of one triangle leaves them open");
+    if (!regions)
+      throw InputError(sheets + ", but an edge of one triangle leaves them open, or what they divide has no volume");
     surface = outer_surface(*regions);
     repair.surface = surface;
     repair.done.push_back(sheets + "; they are left out, and the regions are one");

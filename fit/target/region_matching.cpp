@@ -72,10 +72,11 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
     centers.push_back(sum / static_cast<double>(mesh.cell(c).size()));
   }
   std::map<std::array<int, 2>, std::size_t> votes;  // by reference and region of the target
-  for (const Group& region : regions->regions) {
-    const std::vector<double> inside = WindingNumber(boundary_of_region(*regions, region.number)).at(centers);
+  const std::vector<TriangleMesh> boundaries = boundaries_of_regions(*regions);
+  for (std::size_t r = 0; r < boundaries.size(); ++r) {
+    const std::vector<double> inside = WindingNumber(boundaries[r]).at(centers);
     for (std::size_t c = 0; c < centers.size(); ++c)
-      if (inside[c] > kInside) ++votes[{mesh.references[c], region.number}];
+      if (inside[c] > kInside) ++votes[{mesh.references[c], regions->regions[r].number}];
   }
   std::map<int, int> reference_of = one_to_one(votes);
   if (reference_of.size() != references.size()) return std::nullopt;

@@ -240,6 +240,9 @@ void Diagnostician::find_nesting() {
 void Diagnostician::find_meetings() {
   const SelfIntersections found = self_intersections(mesh_, cancelled_);
   for (const Index t : found.degenerate) add(SurfaceFault::flat_triangle, place_of(center(t), t));
+  for (const auto& [t, s] : edge_contacts(parts_))  // those that only rounding keeps apart
+    if (!std::binary_search(found.pairs.begin(), found.pairs.end(), std::array{t, s}))
+      add(SurfaceFault::face_contact, place_of(meeting_of(corners(t), corners(s)).place, t, s));
   for (const auto& [t, s] : found.pairs) {
     if (repeated_[t] && repeated_[s]) continue;
     const TriangleMeeting meeting = meeting_of(corners(t), corners(s));

@@ -169,7 +169,7 @@ TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& option
   if (!inside.find()) return {};
   if (std::ranges::find(inside.grid().labels, 1) == inside.grid().labels.end())
     throw InputError("surface: it cannot be wrapped: nothing is inside it; do its triangles face outward?");
-  TriangleMesh wrap = outer_surface(surface_of_labels(inside.grid()));
+  TriangleMesh wrap = outer_surface(surface_of_labels(inside.grid(), {.cancelled = cancelled}));
   if (cancelled && cancelled()) return {};
   draw_to(surface, tree, kReach * voxel, wrap);
   if (!surface.face_groups.groups.empty()) wrap.face_groups = groups_of_pieces(surface, wrap);

@@ -11,8 +11,11 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 
 namespace subvol {
@@ -29,6 +32,13 @@ double volume_below(const TriangleMesh& mesh, const std::array<Index, 3>& t, con
 double area_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
   const Vec3& a = mesh.positions[t[0]];
   return 0.5 * (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm();
+}
+
+/// Returns the place of a region in the surface's list, which is sorted by number.
+std::size_t place_of(const RegionSurface& surface, int region) {
+  const auto at = std::ranges::lower_bound(surface.regions, region, {}, &Group::number);
+  assert(at != surface.regions.end() && at->number == region);
+  return static_cast<std::size_t>(at - surface.regions.begin());
 }
 
 /// Drops all but the first of triangles with the same corners. Returns 1 for those kept of which there were several.
@@ -67,18 +77,8 @@ struct EdgeFan {
 };
 
 EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
-  const Vec3& from = mesh.positions[sides[0].low];
-  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
-  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    const auto& t = mesh.triangles[sides[i].triangle];
-    const Vec3 across = mesh.positions[t[0] + t[1] + t[2] - sides[i].low - sides[i].high] - from;
-    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
-  }
-  std::sort(order.begin(), order.end());
   EdgeFan fan;
-  for (const auto& [angle, i] : order) {
+  for (const auto& [angle, i] : sorted_around_edge(mesh, sides)) {
     fan.triangles.push_back(sides[i].triangle);
     fan.faces_next.push_back(sides[i].forward);  // its normal is on the side of larger angles
   }
@@ -109,7 +109,14 @@ class RegionFinder {
   /// A component of space as far as one part of the surface tells.
   struct Cell {
     Index side;             ///< the least of its sides
+    std::size_t part = 0;
     double volume = 0;      ///< signed: negative for the one around the part
+    double area = 0;
+    /// Returns true if the cell encloses more than rounding.
+    bool has_volume() const {
+      constexpr double kFlat = 1e-9;
+      return volume > kFlat * area * std::sqrt(area);
+    }
     std::vector<Index> sides;
   };
   struct Part {
@@ -124,12 +131,12 @@ class RegionFinder {
 
   bool is_manifold(std::size_t part) const { return !parts_with_cells_[part].has_curves; }
 
-  /// Returns false if an edge has only one triangle.
+  /// Returns false if an edge has only one triangle, or if triangles lie on each other there.
   bool join_around_edges() {
     const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh_.triangles, mesh_.positions.size());
     bool closed = true;
     for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
-      if (edge.size() < 2) closed = false;
+      if (edge.size() < 2 || !contacts_at_edge(mesh_, edge).empty()) closed = false;
       if (edge.size() > 2) curve_triangles_.push_back(edge[0].triangle);
       if (!closed) return;
       const EdgeFan fan = sorted_around(mesh_, edge);
@@ -158,14 +165,16 @@ class RegionFinder {
       const Vec3& origin = mesh_.positions[mesh_.triangles[static_cast<std::size_t>(part.triangles[0])][0]];
       const double below = volume_below(mesh_, mesh_.triangles[t], origin) / 6;
       part.own_volume += below;
+      const double area = area_of(mesh_, mesh_.triangles[t]);
       for (const std::size_t side : {2 * t, 2 * t + 1}) {
         const auto first = static_cast<std::size_t>(cells_.of(static_cast<Index>(side)));
         if (first == side) {
           cell_of[side] = cells_of_parts_.size();
           part.cells.push_back(cells_of_parts_.size());
-          cells_of_parts_.push_back({static_cast<Index>(side), 0, {}});
+          cells_of_parts_.push_back({static_cast<Index>(side), part_of[t], 0, 0, {}});
         }
         Cell& cell = cells_of_parts_[cell_of[first]];
+        cell.area += area;
         cell.volume += side == 2 * t ? below : -below;  // what is behind a triangle has it as its outer side
         cell.sides.push_back(static_cast<Index>(side));
       }
@@ -198,7 +207,7 @@ class RegionFinder {
       if (candidates.empty()) continue;
       for (const std::size_t c : parts_with_cells_[around].cells) {
         const Cell& cell = cells_of_parts_[c];
-        if (c == parts_with_cells_[around].outer || !(cell.volume > 0)) continue;
+        if (c == parts_with_cells_[around].outer || !cell.has_volume()) continue;
         const WindingNumber winding(boundary_of(cell));
         for (const std::size_t k : candidates) {
           Part& part = parts_with_cells_[k];
@@ -226,11 +235,6 @@ class RegionFinder {
     return std::ranges::all_of(part.triangles, [&](Index t) { return has_copy_[t] != 0; });
   }
 
-  std::size_t part_of_cell(std::size_t cell) const {
-    for (std::size_t p = 0;; ++p)
-      if (std::ranges::find(parts_with_cells_[p].cells, cell) != parts_with_cells_[p].cells.end()) return p;
-  }
-
   void number_regions() {
     constexpr double kMostly = 0.5;
     // Parts that contain others come first.
@@ -247,7 +251,7 @@ class RegionFinder {
       const Part& part = parts_with_cells_[p];
       bool is_void = false;
       if (part.inside) {
-        const std::size_t parent = part_of_cell(*part.inside);
+        const std::size_t parent = cells_of_parts_[*part.inside].part;
         root_facing[p] = root_facing[parent];
         joined[part.outer] = joined[*part.inside];
         const bool in_region = is_region[joined[*part.inside]] != 0;
@@ -258,7 +262,7 @@ class RegionFinder {
         root_facing[p] = is_manifold(p) && facing(part) < -kMostly ? -1 : 1;
       }
       for (const std::size_t c : part.cells)
-        if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].volume > 0;
+        if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].has_volume();
     }
     region_of_side_.assign(2 * mesh_.triangles.size(), kOutside);
     std::vector<std::size_t> cell_of(2 * mesh_.triangles.size());
@@ -307,28 +311,30 @@ class RegionFinder {
   /// Gives regions the names of groups that bound them.
   static void name_regions(RegionSurface& surface) {
     constexpr double kMost = 0.5;
+    constexpr double kAll = 1 - 1e-9;
     const auto& groups = surface.mesh.face_groups;
-    for (std::size_t g = 0; g < groups.groups.size(); ++g) {
-      double area = 0;
-      std::vector<double> shared(surface.regions.size(), 0.0);
-      for (std::size_t t = 0; t < surface.sides.size(); ++t) {
-        if (groups.of_face[t] != static_cast<Index>(g)) continue;
-        const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
-        area += one;
-        for (const int side : surface.sides[t])
-          if (side != kOutside) shared[static_cast<std::size_t>(side - 1)] += one;
+    if (groups.empty()) return;
+    std::vector<double> of_group(groups.groups.size(), 0.0), of_region(surface.regions.size(), 0.0);
+    std::map<std::pair<Index, std::size_t>, double> shared;  // by group and region
+    for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+      const Index g = groups.of_face[t];
+      const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
+      if (g != kNoIndex) of_group[g] += one;
+      for (const int side : surface.sides[t]) {
+        if (side == kOutside) continue;
+        const std::size_t r = place_of(surface, side);
+        of_region[r] += one;
+        if (g != kNoIndex) shared[{g, r}] += one;
       }
-      for (std::size_t r = 0; r < shared.size(); ++r) {
-        double whole = 0;
-        for (std::size_t t = 0; t < surface.sides.size(); ++t)
-          for (const int side : surface.sides[t])
-            if (side == surface.regions[r].number) whole += area_of(surface.mesh, surface.mesh.triangles[t]);
-        constexpr double kAll = 1 - 1e-9;
-        if (surface.regions[r].name.empty() && area > 0 && shared[r] >= kAll * area && area >= kMost * whole) {
-          surface.regions[r].name = groups.groups[g].name;
-          break;
-        }
-      }
+    }
+    Index named = kNoIndex;  // the last group whose name was given
+    for (const auto& [key, area] : shared) {
+      const auto& [g, r] = key;
+      std::string& name = surface.regions[r].name;
+      if (g == named || !name.empty() || !(of_group[g] > 0)) continue;
+      if (area < kAll * of_group[g] || of_group[g] < kMost * of_region[r]) continue;
+      name = groups.groups[g].name;
+      named = g;
     }
   }
 
@@ -364,6 +370,24 @@ TriangleMesh selected(const TriangleMesh& mesh, std::span<const Index> triangles
   return result;
 }
 
+/// Returns the boundary of a region, given its triangles.
+TriangleMesh boundary_of(const RegionSurface& surface, int region, std::span<const Index> triangles) {
+  std::vector<Index> used;
+  for (const Index t : triangles)
+    used.insert(used.end(), surface.mesh.triangles[t].begin(), surface.mesh.triangles[t].end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  TriangleMesh boundary;
+  for (const Index v : used) boundary.positions.push_back(surface.mesh.positions[v]);
+  for (const Index t : triangles) {
+    std::array<Index, 3> corners = surface.mesh.triangles[t];
+    for (Index& v : corners) v = static_cast<Index>(std::ranges::lower_bound(used, v) - used.begin());
+    if (surface.sides[t][1] == region) std::swap(corners[1], corners[2]);
+    boundary.triangles.push_back(corners);
+  }
+  return boundary;
+}
+
 }  // namespace
 
 const char* to_string(RegionRule rule) {
@@ -384,18 +408,21 @@ std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRul
 
 void orient_sheets(RegionSurface& surface) {
   surface.volumes.assign(surface.regions.size(), 0.0);
-  if (surface.mesh.triangles.empty()) return;
-  const Vec3 origin = surface.mesh.positions[surface.mesh.triangles[0][0]];
+  // Each region has an origin of its own: seen from a distant one, its volume would be lost to rounding.
+  std::vector<Index> origins(surface.regions.size(), kNoIndex);
   for (std::size_t t = 0; t < surface.sides.size(); ++t) {
     auto& [behind, front] = surface.sides[t];
     if (behind == kOutside || (front != kOutside && front < behind)) {
       std::swap(behind, front);
       std::swap(surface.mesh.triangles[t][1], surface.mesh.triangles[t][2]);
     }
-    const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
-    for (std::size_t r = 0; r < surface.regions.size(); ++r) {
-      if (surface.regions[r].number == behind) surface.volumes[r] += below;
-      if (surface.regions[r].number == front) surface.volumes[r] -= below;
+    for (const int region : surface.sides[t]) {
+      if (region == kOutside) continue;
+      const std::size_t r = place_of(surface, region);
+      if (origins[r] == kNoIndex) origins[r] = surface.mesh.triangles[t][0];
+      const Vec3& origin = surface.mesh.positions[origins[r]];
+      const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
+      surface.volumes[r] += region == behind ? below : -below;
     }
   }
 }
@@ -442,15 +469,22 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh) {
 }
 
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region) {
-  TriangleMesh boundary{surface.mesh.positions, {}};
-  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
-    const auto& [behind, front] = surface.sides[t];
-    if (behind != region && front != region) continue;
-    std::array<Index, 3> corners = surface.mesh.triangles[t];
-    if (front == region) std::swap(corners[1], corners[2]);
-    boundary.triangles.push_back(corners);
-  }
-  return boundary;
+  std::vector<Index> triangles;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    if (std::ranges::find(surface.sides[t], region) != surface.sides[t].end())
+      triangles.push_back(static_cast<Index>(t));
+  return boundary_of(surface, region, triangles);
+}
+
+std::vector<TriangleMesh> boundaries_of_regions(const RegionSurface& surface) {
+  std::vector<std::vector<Index>> triangles(surface.regions.size());
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    for (const int side : surface.sides[t])
+      if (side != kOutside) triangles[place_of(surface, side)].push_back(static_cast<Index>(t));
+  std::vector<TriangleMesh> boundaries;
+  for (std::size_t r = 0; r < triangles.size(); ++r)
+    boundaries.push_back(boundary_of(surface, surface.regions[r].number, triangles[r]));
+  return boundaries;
 }
 
 TriangleMesh outer_surface(const RegionSurface& surface) {

@@ -59,7 +59,9 @@ const char* to_string(RegionRule rule);
 /// bound it, and are half or more of its boundary by area.
 ///
 /// surface  orientation does not matter but for the rule above.
-/// returns  nothing if there are no two regions that share a triangle; or if an edge has only one triangle.
+/// returns  nothing if there are no two regions that share a triangle; if an edge has only one triangle; or if at an
+///          edge of more than two, triangles lie on each other up to rounding (`contacts_at_edge`). What encloses no
+///          volume up to rounding is no region.
 /// InputError: a vertex number out of range, a position that is not finite.
 /// Cost: sorts of vertices and edges; of parts inside others, that of winding numbers.
 std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule = RegionRule::automatic);
@@ -68,8 +70,12 @@ std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRul
 /// references as numbers, and their names; if a reference is not positive, they are numbered from 1 on instead.
 RegionSurface surface_of_regions(const VolumeMesh& mesh);
 
-/// Returns the closed boundary of a region, oriented outward, without groups; vertices are numbered as in the surface.
+/// Returns the closed boundary of a region, oriented outward, without groups; and the vertices that it names, in the
+/// surface's order.
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region);
+
+/// Returns the same for each of `RegionSurface::regions`. Cost: almost linear.
+std::vector<TriangleMesh> boundaries_of_regions(const RegionSurface& surface);
 
 /// Returns the triangles between regions and the outside, oriented outward, with their groups, and without vertices
 /// that they do not name.

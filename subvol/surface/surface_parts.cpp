@@ -60,6 +60,16 @@ SurfaceParts surface_parts(const TriangleMesh& surface) {
   return parts;
 }
 
+std::vector<std::array<Index, 2>> edge_contacts(const SurfaceParts& parts) {
+  std::vector<std::array<Index, 2>> contacts;
+  for (const auto* edges : {&parts.touching, &parts.crowded})
+    for (const std::size_t first : *edges)
+      for (const auto& pair : contacts_at_edge(parts.surface.mesh, parts.edge(first))) contacts.push_back(pair);
+  std::sort(contacts.begin(), contacts.end());
+  contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+  return contacts;
+}
+
 std::size_t turn_parts_outward(SurfaceParts& parts) {
   if (parts.num_parts() == 0) return 0;
   const PartNesting nesting = part_nesting(parts.surface.mesh, parts.part, static_cast<int>(parts.num_parts()));

@@ -28,6 +28,9 @@ struct SurfaceParts {
 /// Finds the parts of a surface. InputError: as `welded`. Cost: that of welding.
 SurfaceParts surface_parts(const TriangleMesh& surface);
 
+/// Returns the pairs of triangles that lie on each other at an edge (`contacts_at_edge`), ascending.
+std::vector<std::array<Index, 2>> edge_contacts(const SurfaceParts& parts);
+
 /// Turns the closed parts whose orientation disagrees with their nesting (`part_nesting`), so that normals point out of
 /// the solid. Triangles inside a part that disagree with their neighbors are not turned.
 ///

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/welded_surface.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -14,6 +16,13 @@
 namespace subvol::internal {
 
 namespace {
+
+constexpr double kSameAngle = 1e-9;  // radians; beyond the rounding of angles between vertices of any usual numbers
+
+Index third_corner(const TriangleMesh& mesh, const SurfaceHalfEdge& side) {
+  const auto& t = mesh.triangles[side.triangle];
+  return t[0] + t[1] + t[2] - side.low - side.high;
+}
 
 /// Returns, for each of these vertices, the smallest number of one of them in the same place; kNoIndex for the others.
 std::vector<Index> first_in_place(std::span<const Vec3> positions, std::span<const char> used) {
@@ -124,24 +133,48 @@ std::vector<SurfaceHalfEdge> sorted_half_edges(std::span<const std::array<Index,
   return sides;
 }
 
+std::vector<std::pair<double, std::size_t>> sorted_around_edge(const TriangleMesh& mesh,
+                                                               std::span<const SurfaceHalfEdge> sides) {
+  const Vec3& from = mesh.positions[sides[0].low];
+  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
+  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const Vec3 across = mesh.positions[third_corner(mesh, sides[i])] - from;
+    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
+  }
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+std::vector<std::array<Index, 2>> contacts_at_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
+  std::vector<std::array<Index, 2>> contacts;
+  if (sides.size() < 3) return contacts;
+  const Vec3& from = mesh.positions[sides[0].low];
+  const Vec3 edge = mesh.positions[sides[0].high] - from;
+  const auto has_area = [&](const SurfaceHalfEdge& side) {  // otherwise the angle means nothing
+    const Vec3 across = mesh.positions[third_corner(mesh, side)] - from;
+    return across.cross(edge).norm() > kSameAngle * edge.norm() * std::max(across.norm(), edge.norm());
+  };
+  const std::vector<std::pair<double, std::size_t>> order = sorted_around_edge(mesh, sides);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::size_t next = (i + 1) % order.size();
+    const double between = order[next].first - order[i].first + (next == 0 ? 2 * std::numbers::pi : 0);
+    if (!(between < kSameAngle)) continue;
+    const SurfaceHalfEdge &a = sides[order[i].second], &b = sides[order[next].second];
+    if (third_corner(mesh, a) != third_corner(mesh, b) && has_area(a) && has_area(b))
+      contacts.push_back({std::min(a.triangle, b.triangle), std::max(a.triangle, b.triangle)});
+  }
+  return contacts;
+}
+
 bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, bool outward,
                       std::vector<std::array<std::size_t, 2>>& pairs) {
   pairs.clear();
   if (sides.size() % 2 != 0) return false;
-  const Vec3& from = mesh.positions[sides[0].low];
-  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
-  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
-  std::vector<std::pair<double, std::size_t>> order;  // angle around the edge, position in sides
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    const auto& t = mesh.triangles[sides[i].triangle];
-    const Index third = t[0] + t[1] + t[2] - sides[i].low - sides[i].high;
-    const Vec3 across = mesh.positions[third] - from;
-    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
-  }
-  std::sort(order.begin(), order.end());
+  std::vector<std::pair<double, std::size_t>> order = sorted_around_edge(mesh, sides);
   // A triangle that runs forward has its normal on the side of larger angles: the solid is on the other side. Of two
   // triangles in one place, with a solid on each side, the one whose solid lies before comes first.
-  constexpr double kSameAngle = 1e-9;  // radians; beyond the rounding of angles between vertices of any usual numbers
   for (std::size_t i = 0; i + 1 < order.size(); ++i)
     if (order[i + 1].first - order[i].first < kSameAngle && sides[order[i].second].forward != outward &&
         sides[order[i + 1].second].forward == outward)
@@ -157,11 +190,19 @@ bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 }
 
 double signed_volume_of(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return 0;
-  const Vec3 origin = mesh.positions[mesh.triangles[0][0]];
+  DisjointSets parts(mesh.positions.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    parts.join(a, b);
+    parts.join(a, c);
+  }
+  std::vector<Index> origins(mesh.positions.size(), kNoIndex);  // of the part that a vertex is the least of
   double sum = 0;
-  for (const auto& t : mesh.triangles)
+  for (const auto& t : mesh.triangles) {
+    Index& first = origins[parts.of(t[0])];
+    if (first == kNoIndex) first = t[0];
+    const Vec3& origin = mesh.positions[first];
     sum += (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
+  }
   return sum / 6;
 }
 

@@ -3,8 +3,10 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace subvol::internal {
@@ -55,6 +57,16 @@ void for_each_edge(std::span<const SurfaceHalfEdge> half_edges, Visit&& visit) {
   }
 }
 
+/// Returns the angle of each triangle around an edge, and the position of its side in `sides`, ascending.
+/// sides  the sides of one edge.
+std::vector<std::pair<double, std::size_t>> sorted_around_edge(const TriangleMesh& mesh,
+                                                               std::span<const SurfaceHalfEdge> sides);
+
+/// Returns the pairs of triangles, smaller number first, that lie on each other at an edge of more than two: their
+/// angles around it are equal up to rounding, and their third corners are different ones.
+/// sides  the sides of one edge.
+std::vector<std::array<Index, 2>> contacts_at_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides);
+
 /// Pairs the sides at an edge of more than two triangles, such that solids that only touch there stay apart.
 ///
 /// The triangles are sorted by their angle around the edge. Each one that runs forward is paired with the one across the
@@ -67,8 +79,8 @@ void for_each_edge(std::span<const SurfaceHalfEdge> half_edges, Visit&& visit) {
 bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, bool outward,
                       std::vector<std::array<std::size_t, 2>>& pairs);
 
-/// Returns 1/6 sum of det(a, b, c) over the triangles, relative to their first corner: the volume that a closed surface
-/// encloses, negative if its normals point inward.
+/// Returns 1/6 sum of det(a, b, c) over the triangles, relative to the first corner of their part: the volume that a
+/// closed surface encloses, negative if its normals point inward. Parts are connected by vertices.
 double signed_volume_of(const TriangleMesh& mesh);
 
 }  // namespace subvol::internal

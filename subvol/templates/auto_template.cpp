@@ -49,20 +49,6 @@ constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
 /// a gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
 
-/// Bounding box of a surface, in the coordinates of a frame.
-Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
-  Eigen::AlignedBox3d box;
-  for (const auto& t : surface.triangles)
-    for (Index v : t) box.extend(Vec3(frame.transpose() * surface.positions[v]));
-  return box;
-}
-
-/// Number of cells, along each axis, of the grid around a box; a whole number that may exceed the range of int. On
-/// every side the grid has its spare layers.
-Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
-  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
-}
-
 /// Returns the frames whose grids have at most `most` cells in all if about `cells` of them lie in the solid. The
 /// farther apart the solid's parts are, or the thinner its walls, the more of a grid is empty.
 std::vector<Frame> frames_of_small_grids(double volume, std::size_t cells, double most, std::span<const Frame> frames) {
@@ -75,18 +61,10 @@ std::vector<Frame> frames_of_small_grids(double volume, std::size_t cells, doubl
 
 /// The grid around the surface; the placement must be such that its cells can be numbered.
 VoxelGrid placed_grid(const Placement& placement) {
-  const auto& [axes, box] = placement.frame;
-  const Eigen::Array3d cells = cells_around(box, placement.size);
-  VoxelGrid grid;
-  Vec3 low = box.center();
-  for (int a = 0; a < 3; ++a) {
-    const auto axis = static_cast<std::size_t>(a);
-    grid.cells[axis] = static_cast<int>(cells[a]);
-    low[a] -= placement.size * (grid.cells[axis] / 2.0 + (placement.half_offset[axis] ? 0.5 : 0.0));
-  }
-  grid.edges = placement.size * axes;
-  grid.origin = axes * low;
-  return grid;
+  Vec3 offset = Vec3::Zero();
+  for (int a = 0; a < 3; ++a)
+    if (placement.half_offset[static_cast<std::size_t>(a)]) offset[a] = 0.5;
+  return grid_around(placement.frame.axes, placement.frame.box, placement.size, offset);
 }
 
 /// A carved grid with the right topology and count.
@@ -408,11 +386,7 @@ AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplate
       }
       if (best || result.cancelled) return result;
     }
-    if (none_usable && rung == 0)
-      throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
-                       std::to_string(std::lround(most_cells)) +
-                       " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
-                       "by one");
+    if (none_usable && rung == 0) throw too_sparse(cells, most_cells);
     if (none_usable) break;
     std::vector<Candidate> candidates;
     const double done = static_cast<double>(rung) / kLadder.size();

@@ -2,11 +2,13 @@
 #include "subvol/templates/label_surface.h"
 
 #include "subvol/base/dense_solve.h"
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_labels.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Dense>
 
 #include <algorithm>
 #include <cmath>
@@ -33,7 +35,12 @@ struct Face {
 /// The sheets between voxels and the way they are smoothed, in units of voxels.
 class LabelSheets {
  public:
-  LabelSheets(const LabelGrid& grid, const LabelSurfaceOptions& options) : grid_(grid), options_(options) {
+  LabelSheets(const LabelGrid& grid, const LabelSurfaceOptions& options)
+      : grid_(grid), options_(options), stop_([&options] { return !options.cancelled || !options.cancelled(); }) {
+    const auto [nx, ny, nz] = grid.counts;
+    if (nx < 1 || ny < 1 || nz < 1 || static_cast<double>(nx) * ny * nz != static_cast<double>(grid.labels.size()))
+      throw InputError(formatted("segmentation: it has %zu labels, expected those of %d x %d x %d voxels",
+                                 grid.labels.size(), nx, ny, nz));
     values_ = grid.labels;
     std::sort(values_.begin(), values_.end());
     values_.erase(std::unique(values_.begin(), values_.end()), values_.end());
@@ -43,16 +50,18 @@ class LabelSheets {
 
   RegionSurface run() {
     const VoxelLabels labels = cleaned();
+    if (stop_.is_stopped()) return {};
     list_faces(labels);
     find_neighbors();
     smooth();
     restore_volumes();
-    return result();
+    return stop_.is_stopped() ? RegionSurface{} : result();
   }
 
  private:
   VoxelLabels cleaned();
-  std::size_t drop_specks(VoxelLabels& labels) const;
+  std::size_t drop_specks(VoxelLabels& labels, bool keeps_regions);
+  void require_regions(const VoxelLabels& labels) const;
   void list_faces(const VoxelLabels& labels);
   void find_neighbors();
   void smooth();
@@ -62,6 +71,7 @@ class LabelSheets {
 
   const LabelGrid& grid_;
   const LabelSurfaceOptions& options_;
+  SearchStop stop_;
   std::vector<int> values_;              ///< the label of each region
   std::vector<double> wanted_;           ///< volume of each region
   std::vector<Face> faces_;
@@ -71,29 +81,60 @@ class LabelSheets {
   std::size_t specks_ = 0;
 };
 
-/// Gives specks to their neighbors. Returns how many there were.
-std::size_t LabelSheets::drop_specks(VoxelLabels& labels) const {
+/// Gives specks to their neighbors, those of one label after the other. Returns how many there were.
+/// keeps_regions  the largest component of each region stays, even if it is a speck.
+std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
+  std::vector<int> component;
+  const auto count = static_cast<std::size_t>(labels.components(component));
+  const int outside = component.front();
+  std::vector<std::size_t> size(count, 0);
+  for (const int c : component) ++size[c];
+  const auto is_small = [&](int c) { return c != outside && size[c] < options_.least_voxels; };
+  std::vector<std::vector<Index>> cells(count);  // of small components
+  std::vector<int> label_of(count);
+  for (std::size_t c = 0; c < component.size(); ++c) {
+    label_of[component[c]] = labels.label(static_cast<Index>(c));
+    if (is_small(component[c])) cells[component[c]].push_back(static_cast<Index>(c));
+  }
+  std::vector<std::vector<int>> of_label(static_cast<std::size_t>(labels.num_regions()) + 1);
+  for (std::size_t c = 0; c < count; ++c) of_label[label_of[c]].push_back(static_cast<int>(c));
+  DisjointSets sets(count);  // of components that specks have connected
+  const auto join = [&](Index a, Index b) {
+    const Index kept = std::min(sets.of(a), sets.of(b)), other = std::max(sets.of(a), sets.of(b));
+    if (kept == other) return;
+    const bool were_small = is_small(kept) && is_small(other);
+    sets.join(kept, other);
+    size[kept] += size[other];
+    if (were_small) cells[kept].insert(cells[kept].end(), cells[other].begin(), cells[other].end());
+    cells[other].clear();
+  };
   std::size_t dropped = 0;
-  for (int label = 0; label <= labels.num_regions(); ++label) {
-    std::vector<int> component;
-    const int count = labels.components(label, component);
-    std::vector<std::size_t> size(static_cast<std::size_t>(count), 0);
-    for (const int c : component)
-      if (c >= 0) ++size[c];
-    std::vector<std::map<int, int>> votes(size.size());
-    for (std::size_t c = 0; c < component.size(); ++c) {
-      if (component[c] < 0 || size[component[c]] >= options_.least_voxels) continue;
-      for (const Index offset : labels.face_offsets())
-        if (const int other = labels.label(static_cast<Index>(c) + offset); other != label)
-          ++votes[component[c]][other];
+  for (int label = 0; label <= labels.num_regions() && !stop_.is_stopped(); ++label) {
+    std::vector<int>& of_this = of_label[label];
+    for (int& c : of_this) c = sets.of(c);
+    std::sort(of_this.begin(), of_this.end());
+    of_this.erase(std::unique(of_this.begin(), of_this.end()), of_this.end());
+    if (keeps_regions && label != kOutside && !of_this.empty()) {
+      const auto largest =
+          std::max_element(of_this.begin(), of_this.end(), [&](int a, int b) { return size[a] < size[b]; });
+      of_this.erase(largest);
     }
-    for (const auto& vote : votes) dropped += !vote.empty();
-    for (std::size_t c = 0; c < component.size(); ++c) {
-      if (component[c] < 0 || votes[component[c]].empty()) continue;
-      const auto& vote = votes[component[c]];
-      labels.set(static_cast<Index>(c), std::max_element(vote.begin(), vote.end(), [](const auto& a, const auto& b) {
-                                          return a.second < b.second;
-                                        })->first);
+    for (const int c : of_this) {
+      if (!is_small(c)) continue;
+      std::map<int, int> votes;
+      for (const Index cell : cells[c])
+        for (const Index offset : labels.face_offsets())
+          if (const int other = labels.label(cell + offset); other != label) ++votes[other];
+      if (votes.empty()) continue;
+      ++dropped;
+      const int most = std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) {
+                         return a.second < b.second;
+                       })->first;
+      const std::vector<Index> own = cells[c];
+      for (const Index cell : own) labels.set(cell, most);
+      for (const Index cell : own)
+        for (const Index offset : labels.face_offsets())
+          if (labels.label(cell + offset) == most) join(c, component[cell + offset]);
     }
   }
   return dropped;
@@ -121,7 +162,7 @@ VoxelLabels LabelSheets::cleaned() {
     for (const Index offset : labels.all_offsets()) sum += given[cell + offset] == label ? kNeighbor : 0;
     return sum;
   };
-  specks_ = drop_specks(labels);
+  specks_ = drop_specks(labels, false);
   wanted_.assign(values_.size(), 0.0);
   for (const int label : labels.labels())
     if (label != kOutside) wanted_[static_cast<std::size_t>(label - 1)] += 1;
@@ -131,10 +172,30 @@ VoxelLabels LabelSheets::cleaned() {
                        " has only specks of fewer than " + std::to_string(options_.least_voxels) + " voxels");
   std::vector<char> changes(labels.num_cells(), 0);
   for (int round = 0; round < kRounds; ++round) {
-    make_points_good(labels, share, changes);  // what stays bad is an edge of four faces, which does no harm
-    if (drop_specks(labels) == 0) break;
+    // What stays bad is an edge of four faces, which does no harm.
+    make_points_good(labels, share, changes, &stop_);
+    if (stop_.is_stopped()) break;
+    const std::size_t dropped = drop_specks(labels, true);
+    if (dropped == 0) break;
+    specks_ += dropped;
   }
+  if (!stop_.is_stopped()) require_regions(labels);
   return labels;
+}
+
+/// Throws if less than a speck and less than half is left of a region.
+void LabelSheets::require_regions(const VoxelLabels& labels) const {
+  std::vector<std::size_t> left(values_.size(), 0);
+  for (const int label : labels.labels())
+    if (label != kOutside) ++left[static_cast<std::size_t>(label - 1)];
+  for (std::size_t r = 0; r < values_.size(); ++r) {
+    const auto count = static_cast<double>(left[r]);
+    if (count > 0 && (left[r] >= options_.least_voxels || 2 * count >= wanted_[r])) continue;
+    throw InputError(
+        formatted("segmentation: of the %.0f voxels of label %d, %zu are left without the places where "
+                  "regions touch along an edge or at a corner alone: it is too thin for its voxels",
+                  wanted_[r], values_[r], left[r]));
+  }
 }
 
 void LabelSheets::list_faces(const VoxelLabels& labels) {
@@ -213,7 +274,7 @@ void LabelSheets::find_neighbors() {
 void LabelSheets::smooth() {
   constexpr double kForth = 0.5, kBack = -0.53, kMostMove = 1;  // voxels
   std::vector<Vec3> next(positions_.size());
-  for (int round = 0; round < options_.rounds; ++round)
+  for (int round = 0; round < options_.rounds && !stop_.is_stopped(); ++round)
     for (const double step : {kForth, kBack}) {
       for (std::size_t v = 0; v < positions_.size(); ++v) {
         next[v] = positions_[v];
@@ -256,7 +317,7 @@ void LabelSheets::restore_volumes() {
   Index count = 0;
   for (auto& [pair, number] : sheet_of_pair) number = count++;
   const auto n = static_cast<Eigen::Index>(values_.size());
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kRounds && !stop_.is_stopped(); ++round) {
     const std::vector<double> now = volumes();
     Eigen::VectorXd missing(n);
     double worst = 0;
@@ -269,12 +330,12 @@ void LabelSheets::restore_volumes() {
     std::vector<double> area(static_cast<std::size_t>(count), 0.0);
     for (const Face& face : faces_)
       area[static_cast<std::size_t>(sheet_of_pair[face.pair])] += area_vector(face, positions_).norm();
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);  // M A M^T, M: signs of the sheets in the regions
+    std::vector<MatrixEntry> matrix;  // M A M^T, M: signs of the sheets in the regions
     for (const auto& [pair, number] : sheet_of_pair)
       for (const int a : pair)
         for (const int b : pair)
           if (a != kOutside && b != kOutside)
-            matrix(a - 1, b - 1) += (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)];
+            matrix.push_back({a - 1, b - 1, (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)]});
     const Eigen::VectorXd y = least_norm_solution(matrix, missing);
     // Normals of each sheet at each vertex, one after the other: at a curve, each sheet asks for its own move.
     std::vector<std::pair<std::pair<Index, Index>, Vec3>> normals;  // vertex, sheet

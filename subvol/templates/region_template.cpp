@@ -54,11 +54,11 @@ class RegionSearch {
   RegionSearch(const RegionSurface& surface, const RegionTemplateOptions& options)
       : surface_(surface),
         options_(options),
-        wanted_(topology_of(surface)),
-        stop_([this] { return !options_.progress || options_.progress(fraction_); }) {
-    for (const Group& region : surface.regions) {
-      boundaries_.push_back(boundary_of_region(surface, region.number));
-      areas_.push_back(area_of(boundaries_.back()));
+        stop_([this] { return !options_.progress || options_.progress(fraction_); }),
+        wanted_(topology_of(surface, &stop_)) {
+    boundaries_ = boundaries_of_regions(surface);
+    for (const TriangleMesh& boundary : boundaries_) {
+      areas_.push_back(area_of(boundary));
       area_ += areas_.back();
     }
     for (const double volume : surface.volumes) volume_ += volume;
@@ -72,21 +72,21 @@ class RegionSearch {
   std::optional<LabeledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
   std::optional<LabeledGrid> best_of_cubes(double cells, double most_cells);
   std::optional<LabeledGrid> labeled(VoxelGrid grid, double cells, bool is_exact);
-  VoxelGrid cubes(const Mat3& frame, double size, double offset) const;
   double size_for(double cells, bool counts_pillow) const;
   double count_of(const VoxelLabels& labels, bool counts_pillow) const;
   RegionTemplate finished(const LabeledGrid& candidate, std::size_t cells) const;
 
   const RegionSurface& surface_;
   const RegionTemplateOptions& options_;
+  double fraction_ = 0;
+  SearchStop stop_;
   RegionTopology wanted_;
   int voids_ = 1;
   std::vector<TriangleMesh> boundaries_;
   std::vector<double> areas_;     ///< of the boundaries of regions
   double area_ = 0, volume_ = 0;  ///< sums
   std::vector<std::size_t> misses_;  ///< by region
-  double fraction_ = 0;
-  SearchStop stop_;
+  std::size_t num_grids_ = 0;        ///< that were labeled
 };
 
 /// Returns the edge length for which volume / size^3 cells, and a layer of cells on the sheets' sides, are as many as
@@ -114,33 +114,19 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
   return static_cast<double>(count);
 }
 
-VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) const {
-  Eigen::AlignedBox3d box;
-  for (const auto& t : surface_.mesh.triangles)
-    for (const Index v : t) box.extend(Vec3(frame.transpose() * surface_.mesh.positions[v]));
-  const Eigen::Array3d counts = (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
-  VoxelGrid grid;
-  Vec3 low = box.center();
-  for (int a = 0; a < 3; ++a) {
-    grid.cells[static_cast<std::size_t>(a)] = static_cast<int>(counts[a]);
-    low[a] -= size * (counts[a] / 2.0 + offset);
-  }
-  grid.edges = size * frame;
-  grid.origin = frame * low;
-  return grid;
-}
-
 /// Labels a grid. Returns nothing if its regions cannot be made right.
 std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
-  constexpr int kWeightRounds = 5;
+  constexpr int kWeightRounds = 5, kLinesOfCell = 4;
   constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
   const auto num_regions = static_cast<int>(surface_.regions.size());
+  ++num_grids_;
   LabelFractions fractions(static_cast<std::size_t>(num_regions) + 1);
   ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic)
   for (int r = 0; r < num_regions; ++r)
-    errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid); });
+    errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid, kLinesOfCell, &stop_); });
   errors.rethrow();
+  if (stop_.is_stopped()) return std::nullopt;
   fractions[0].assign(grid.num_cells(), 1.0);
   for (int r = 1; r <= num_regions; ++r)
     for (std::size_t c = 0; c < grid.num_cells(); ++c)
@@ -159,7 +145,8 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
     RegionTopology found;
     if (assigned) {
       evolve(labels, fractions, &stop_);
-      found = labels.topology();
+      found = labels.topology(&stop_);
+      if (stop_.is_stopped()) return std::nullopt;
     }
     bool all_right = assigned;
     for (std::size_t r = 0; r < is_wrong.size(); ++r) {
@@ -185,7 +172,7 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
       if (!wanted_.sheets.contains(pair))
         for (std::size_t r = 0; r < is_wrong.size(); ++r) {
           const auto touches = [&](int other) {
-            const auto [low, high] = std::minmax(static_cast<int>(r) + 1, other);
+            const auto [low, high] = std::minmax({static_cast<int>(r) + 1, other});
             return wanted_.sheets.contains({low, high});
           };
           if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
@@ -248,19 +235,22 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
+  const auto labeled_cubes = [&](const Mat3& frame, double size, double offset) -> std::optional<LabeledGrid> {
+    const Eigen::AlignedBox3d box = box_in(frame, surface_.mesh);
+    if (!(cells_around(box, size).prod() <= most_cells)) return std::nullopt;
+    return labeled(grid_around(frame, box, size, Vec3::Constant(offset)), cells, false);
+  };
   double size = size_for(cells, options_.for_pillow);
   std::optional<LabeledGrid> best;
   for (const double factor : kSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
-        VoxelGrid grid = cubes(frame, factor * size, offset);
-        if (static_cast<double>(grid.num_cells()) > most_cells) continue;
-        std::optional<LabeledGrid> found = labeled(std::move(grid), cells, false);
+        std::optional<LabeledGrid> found = labeled_cubes(frame, factor * size, offset);
         if (!found) continue;
         if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
           const double corrected = size * std::cbrt(found->share);
-          found = labeled(cubes(frame, factor * corrected, offset), cells, false);
+          found = labeled_cubes(frame, factor * corrected, offset);
           if (found) size = corrected;
         }
         if (found && (!best || is_better(*found, *best))) best = std::move(found);
@@ -291,6 +281,10 @@ RegionTemplateResult RegionSearch::run() {
   constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
   const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
   RegionTemplateResult result;
+  if (stop_.is_stopped()) {  // the topology is not known then
+    result.cancelled = true;
+    return result;
+  }
   std::optional<LabeledGrid> best;
   std::size_t asked = 0;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
@@ -305,6 +299,7 @@ RegionTemplateResult RegionSearch::run() {
       result.cancelled = true;
       return result;
     }
+    if (num_grids_ == 0) throw too_sparse(options_.cells, most_cells);
     if (found && (!best || is_better(*found, *best))) {
       best = std::move(found);
       asked = static_cast<std::size_t>(std::lround(cells));

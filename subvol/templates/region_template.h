@@ -48,7 +48,8 @@ struct RegionTemplateResult {
 /// planes of the surface if there are any (`lines_through_planes`).
 ///
 /// If no grid with the requested count works, counts up to 9 times as large are tried.
-/// InputError: options out of range; as `topology_of`. Deterministic; serial but for the shares of regions.
+/// InputError: options out of range; as `topology_of`; regions so far apart, or so thin, that every grid is too large.
+/// Deterministic; serial but for the shares of regions.
 RegionTemplateResult region_template(const RegionSurface& surface, const RegionTemplateOptions& options = {});
 
 }  // namespace subvol

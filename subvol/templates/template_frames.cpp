@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/template_frames.h"
 
+#include "subvol/templates/plane_grid.h"
+
 #include <Eigen/Dense>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <string>
 
 namespace subvol::internal {
 
@@ -96,6 +99,37 @@ std::vector<Mat3> template_frames(const TriangleMesh& surface) {
     if (std::none_of(frames.begin(), frames.end(), [&](const Mat3& other) { return same_axes(frame, other); }))
       frames.push_back(frame);
   return frames;
+}
+
+Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
+  Eigen::AlignedBox3d box;
+  for (const auto& t : surface.triangles)
+    for (Index v : t) box.extend(Vec3(frame.transpose() * surface.positions[v]));
+  return box;
+}
+
+Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
+  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
+}
+
+VoxelGrid grid_around(const Mat3& frame, const Eigen::AlignedBox3d& box, double size, const Vec3& offset) {
+  const Eigen::Array3d cells = cells_around(box, size);
+  VoxelGrid grid;
+  Vec3 low = box.center();
+  for (int a = 0; a < 3; ++a) {
+    grid.cells[static_cast<std::size_t>(a)] = static_cast<int>(cells[a]);
+    low[a] -= size * (cells[a] / 2.0 + offset[a]);
+  }
+  grid.edges = size * frame;
+  grid.origin = frame * low;
+  return grid;
+}
+
+InputError too_sparse(std::size_t cells, double most) {
+  return InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
+                    std::to_string(std::lround(most)) +
+                    " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one by "
+                    "one");
 }
 
 }  // namespace subvol::internal

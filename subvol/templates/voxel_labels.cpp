@@ -99,12 +99,14 @@ std::map<std::array<int, 2>, SheetTopology> topology_of_sheets(std::span<const s
   return result;
 }
 
-RegionTopology topology_of(const RegionSurface& surface) {
+RegionTopology topology_of(const RegionSurface& surface, SearchStop* stop) {
   RegionTopology result;
   std::map<int, int> place{{kOutside, 0}};
-  for (const Group& region : surface.regions) {
-    result.regions.push_back(solid_boundary(boundary_of_region(surface, region.number)).topology);
-    place[region.number] = static_cast<int>(result.regions.size());
+  const std::vector<TriangleMesh> boundaries = boundaries_of_regions(surface);
+  for (std::size_t r = 0; r < boundaries.size(); ++r) {
+    if (is_stopped(stop)) return result;
+    result.regions.push_back(solid_boundary(boundaries[r]).topology);
+    place[surface.regions[r].number] = static_cast<int>(result.regions.size());
   }
   std::vector<std::array<Index, 4>> faces;
   std::vector<std::array<int, 2>> keys;
@@ -183,38 +185,50 @@ bool VoxelLabels::is_simple(Index cell, int label) {
   return true;
 }
 
+void VoxelLabels::flood(Index seed, int number, std::vector<int>& component, std::vector<Index>& stack) const {
+  const int label = labels_[seed];
+  stack.assign(1, seed);
+  component[seed] = number;
+  while (!stack.empty()) {
+    const Index c = stack.back();
+    stack.pop_back();
+    std::array<bool, 6> there{true, true, true, true, true, true};
+    if (!frame_.may_flip(c)) {
+      const int i = c % cells_[0], j = c / cells_[0] % cells_[1], k = c / cells_[0] / cells_[1];
+      there = {i > 0, i + 1 < cells_[0], j > 0, j + 1 < cells_[1], k > 0, k + 1 < cells_[2]};
+    }
+    for (std::size_t f = 0; f < 6; ++f) {
+      if (!there[f]) continue;
+      const Index other = c + frame_.face_offsets()[f];
+      if (component[other] >= 0 || labels_[other] != label) continue;
+      component[other] = number;
+      stack.push_back(other);
+    }
+  }
+}
+
 int VoxelLabels::components(int label, std::vector<int>& component) const {
   component.assign(labels_.size(), -1);
   std::vector<Index> stack;
   int count = 0;
-  for (std::size_t seed = 0; seed < labels_.size(); ++seed) {
-    if (component[seed] >= 0 || labels_[seed] != label) continue;
-    stack.assign(1, static_cast<Index>(seed));
-    component[seed] = count;
-    while (!stack.empty()) {
-      const Index c = stack.back();
-      stack.pop_back();
-      std::array<bool, 6> there{true, true, true, true, true, true};
-      if (!frame_.may_flip(c)) {
-        const int i = c % cells_[0], j = c / cells_[0] % cells_[1], k = c / cells_[0] / cells_[1];
-        there = {i > 0, i + 1 < cells_[0], j > 0, j + 1 < cells_[1], k > 0, k + 1 < cells_[2]};
-      }
-      for (std::size_t f = 0; f < 6; ++f) {
-        if (!there[f]) continue;
-        const Index other = c + frame_.face_offsets()[f];
-        if (component[other] >= 0 || labels_[other] != label) continue;
-        component[other] = count;
-        stack.push_back(other);
-      }
-    }
-    ++count;
-  }
+  for (std::size_t seed = 0; seed < labels_.size(); ++seed)
+    if (component[seed] < 0 && labels_[seed] == label) flood(static_cast<Index>(seed), count++, component, stack);
   return count;
 }
 
-RegionTopology VoxelLabels::topology() const {
+int VoxelLabels::components(std::vector<int>& component) const {
+  component.assign(labels_.size(), -1);
+  std::vector<Index> stack;
+  int count = 0;
+  for (std::size_t seed = 0; seed < labels_.size(); ++seed)
+    if (component[seed] < 0) flood(static_cast<Index>(seed), count++, component, stack);
+  return count;
+}
+
+RegionTopology VoxelLabels::topology(SearchStop* stop) const {
   RegionTopology result;
   for (int r = 1; r <= num_regions_; ++r) {
+    if (is_stopped(stop)) return result;
     VoxelSolid solid(cells_, VertexRule::manifold);
     for (std::size_t c = 0; c < labels_.size(); ++c)
       if (labels_[c] == r) solid.flip(static_cast<Index>(c));
@@ -279,6 +293,8 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
                    const RegionTopology& wanted, int voids, SearchStop* stop) {
   constexpr int kRounds = 4;
   for (std::size_t i = 0; i < labels.num_cells(); ++i) {
+    constexpr std::size_t kBetween = 64;  // cells: there may be thousands of regions
+    if (i % kBetween == 0 && is_stopped(stop)) return false;
     const auto c = static_cast<Index>(i);
     if (!labels.may_set(c)) continue;
     double sum = 0, largest = 0;
@@ -296,7 +312,9 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
     if (!make_points_good(labels, share_of, changes, stop)) return false;
     bool changed = false;
     for (int r = 1; r <= labels.num_regions(); ++r)
-      if (!drop_surplus(labels, r, wanted.regions[static_cast<std::size_t>(r - 1)].components, changed)) return false;
+      if (is_stopped(stop) ||
+          !drop_surplus(labels, r, wanted.regions[static_cast<std::size_t>(r - 1)].components, changed))
+        return false;
     if (!drop_surplus(labels, kOutside, voids, changed)) return false;
     if (!changed) return true;
   }

@@ -30,7 +30,8 @@ struct RegionTopology {
 
 /// Finds the topology of a surface's regions, in the order of `RegionSurface::regions`. InputError: as
 /// `solid_boundary`.
-RegionTopology topology_of(const RegionSurface& surface);
+/// stop  if given and stopped, the work ends early; the result then means nothing.
+RegionTopology topology_of(const RegionSurface& surface, SearchStop* stop = nullptr);
 
 /// Returns the topology of each sheet. faces: corners of each, 3 or 4; kNoIndex for those that a triangle lacks.
 /// sheet_of_face: key of each.
@@ -66,10 +67,15 @@ class VoxelLabels {
 
   /// Numbers the face-connected components of the cells with a label; -1 for others. Returns their number.
   int components(int label, std::vector<int>& component) const;
-  /// All points must be good.
-  RegionTopology topology() const;
+  /// Numbers those of all labels.
+  int components(std::vector<int>& component) const;
+  /// All points must be good. stop: if given and stopped, the work ends early; the result then means nothing.
+  RegionTopology topology(SearchStop* stop = nullptr) const;
 
  private:
+  /// Gives a number to the cells that are connected with one, and have its label. stack: for its own use.
+  void flood(Index seed, int number, std::vector<int>& component, std::vector<Index>& stack) const;
+
   std::array<int, 3> cells_;
   int num_regions_;
   const std::array<bool, 256>*region_table_, *outside_table_;

@@ -5,6 +5,8 @@
 #include "subvol/surface/solid_topology.h"
 #include "tests/support/region_fixtures.h"
 
+#include <Eigen/Geometry>
+
 #include <catch2/catch.hpp>
 
 #include <limits>
@@ -204,4 +206,42 @@ TEST_CASE("Why no grid has the topology is told with the place", "[diagnosis]") 
   const SurfaceDiagnosis slit = diagnose(together(kUnit, box_surface({1.0002, 0, 0}, {2, 1, 1})));
   CHECK(is_too_thin_for_grids(slit, 3000));
   CHECK_FALSE(is_too_thin_for_grids(slit, 30'000'000));
+}
+
+TEST_CASE("Boxes that touch in a face with different diagonals are in contact, whatever rounding says",
+          "[diagnosis][regions]") {
+  for (int turn = 0; turn < 12; ++turn) {
+    // The face between the boxes is there twice, with a diagonal from vertex 4 and one from vertex 5.
+    TriangleMesh surface;
+    const Mat3 rotation =
+        Eigen::AngleAxisd(0.3 + 0.7 * turn, Vec3(1 + turn, 2, 3 - turn).normalized()).toRotationMatrix();
+    for (const double z : {0.0, 1.0, 2.3})
+      for (const auto& [x, y] : {std::pair(0, 0), std::pair(1, 0), std::pair(1, 1), std::pair(0, 1)})
+        surface.positions.push_back(rotation * Vec3(x, y, z) + Vec3(0.1 * turn, -1, 2));
+    for (const Index low : {0, 4})
+      for (Index i = 0; i < 4; ++i) {
+        const Index a = low + i, b = low + (i + 1) % 4;
+        surface.triangles.push_back({a, b, b + 4});
+        surface.triangles.push_back({a, b + 4, a + 4});
+      }
+    for (const std::array<Index, 3>& t : {std::array<Index, 3>{0, 3, 2},
+                                          {0, 2, 1},
+                                          {4, 5, 6},
+                                          {4, 6, 7},
+                                          {5, 4, 7},
+                                          {5, 7, 6},
+                                          {8, 9, 10},
+                                          {8, 10, 11}})
+      surface.triangles.push_back(t);
+    CHECK(count(diagnose(surface), SurfaceFault::face_contact) == 4);
+    CHECK(!find_regions(surface));
+    const SurfaceRepair repair = repair_surface(surface);
+    CHECK(repair.is_fillable);
+    CHECK(solid_boundary(repair.surface).volume == Approx(2.3).epsilon(0.01));
+    surface.triangles[20] = {5, 4, 6};  // now with the same diagonal: an interface
+    surface.triangles[21] = {7, 6, 4};
+    REQUIRE(find_regions(surface));
+    CHECK(find_regions(surface)->regions.size() == 2);
+    CHECK(count(diagnose(surface), SurfaceFault::face_contact) == 2);
+  }
 }

@@ -2,6 +2,7 @@
 #include "subvol/surface/region_surface.h"
 
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/welded_surface.h"
 #include "tests/support/region_fixtures.h"
 #include "tests/support/sample_meshes.h"
 
@@ -139,4 +140,53 @@ TEST_CASE("Regions get the names of groups that bound them alone", "[regions]") 
   const auto found = find_regions(surface);
   REQUIRE(found);
   CHECK(found->regions == std::vector<Group>{{"shell", 1, 3}, {"core", 2, 3}});
+}
+
+TEST_CASE("Regions that lie far apart have their own volumes", "[regions]") {
+  for (const double distance : {1e5, 1e7, 1e9}) {
+    TriangleMesh far = test::slabs_surface(2);
+    for (Vec3& p : far.positions) p += distance * Vec3(0.57, -0.61, 0.49);
+    const TriangleMesh both = together(test::slabs_surface(2), far);
+    const auto found = find_regions(both);
+    REQUIRE(found);
+    REQUIRE(found->volumes.size() == 4);
+    for (const double volume : found->volumes) CHECK(volume == Approx(0.5).epsilon(1e-6));
+    CHECK(internal::signed_volume_of(together(box_surface({0, 0, 0}, {1, 1, 1}), far)) > 0);
+  }
+}
+
+TEST_CASE("What has no volume up to rounding is no region", "[regions]") {
+  TriangleMesh slabs = test::slabs_surface(4);
+  for (Vec3& p : slabs.positions)
+    if (p.z() == 0.75) p.z() = 0.5 + 1e-13;
+  const auto found = find_regions(slabs);
+  REQUIRE(found);
+  CHECK(are(found->volumes, {0.25, 0.25, 0.5}));
+}
+
+TEST_CASE("Boundaries of regions hold their own vertices, in the surface's order", "[regions]") {
+  const auto found = find_regions(test::slabs_surface(5));
+  REQUIRE(found);
+  const std::vector<TriangleMesh> boundaries = boundaries_of_regions(*found);
+  REQUIRE(boundaries.size() == 5);
+  for (std::size_t r = 0; r < boundaries.size(); ++r) {
+    const TriangleMesh one = boundary_of_region(*found, found->regions[r].number);
+    CHECK(one.positions == boundaries[r].positions);
+    CHECK(one.triangles == boundaries[r].triangles);
+    CHECK(one.positions.size() == 8);
+    CHECK(internal::signed_volume_of(one) == Approx(0.2));
+    CHECK(std::ranges::is_sorted(one.positions, {}, [](const Vec3& p) { return p.z(); }));
+  }
+}
+
+TEST_CASE("The first group that bounds a region alone names it, and names no other", "[regions]") {
+  TriangleMesh surface = together(box_surface({0, 0, 0}, {1, 1, 1}, 1), box_surface({1, 0, 0}, {2, 1, 1}, 1));
+  surface.face_groups.groups = {{"one", 1, 2}, {"none", 2, 2}, {"late", 3, 2}, {"two", 4, 2}};
+  surface.face_groups.of_face.assign(24, 0);
+  std::fill_n(surface.face_groups.of_face.begin() + 12, 12, 3);
+  surface.face_groups.of_face[0] = kNoIndex;
+  const auto found = find_regions(surface);
+  REQUIRE(found);
+  REQUIRE(found->regions.size() == 2);
+  CHECK(found->regions[1].name == "two");
 }

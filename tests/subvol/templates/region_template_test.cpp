@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
+#include "subvol/templates/label_surface.h"
 #include "subvol/templates/pillow.h"
 #include "subvol/templates/voxel_labels.h"
 #include "tests/support/region_fixtures.h"
@@ -102,4 +103,34 @@ TEST_CASE("Templates with regions can be cancelled, and refuse senseless counts"
   REQUIRE(surface);
   CHECK(region_template(*surface, {300, false, [](double) { return false; }}).cancelled);
   CHECK_THROWS_AS(region_template(*surface, {2, false, {}}), InputError);
+}
+
+TEST_CASE("Regions that are too far apart for any grid are refused", "[regions][templates]") {
+  for (const double distance : {1e4, 1e9}) {
+    TriangleMesh far = test::slabs_surface(2);
+    for (Vec3& p : far.positions) p += Vec3::Constant(distance);
+    const auto surface = find_regions(together(test::slabs_surface(2), far));
+    REQUIRE(surface);
+    REQUIRE(surface->regions.size() == 4);
+    CHECK_THROWS_WITH(region_template(*surface, {100, false, {}}), Catch::Contains("far apart"));
+    CHECK_THROWS_WITH(region_template(*surface, {100, true, {}}), Catch::Contains("far apart"));
+  }
+}
+
+TEST_CASE("A search among many regions ends soon after it is told to", "[regions][templates]") {
+  constexpr int kSide = 40, kPart = 4;  // a thousand regions
+  LabelGrid grid;
+  grid.counts = {kSide, kSide, kSide};
+  for (int k = 0; k < kSide; ++k)
+    for (int j = 0; j < kSide; ++j)
+      for (int i = 0; i < kSide; ++i)
+        grid.labels.push_back(1 + i / kPart + kSide / kPart * (j / kPart + kSide / kPart * (k / kPart)));
+  const RegionSurface surface = surface_of_labels(grid, {0, 1, {}});
+  REQUIRE(surface.regions.size() == 1000);
+  int questions = 0;
+  const RegionTemplateResult result = region_template(surface, {1000, false, [&](double) { return ++questions < 3; }});
+  CHECK(result.cancelled);
+  CHECK(!result.made);
+  CHECK(questions == 3);
+  CHECK(surface_of_labels(grid, {30, 1, [] { return true; }}).regions.empty());
 }
