@@ -40,7 +40,8 @@ struct MendedSurface {
 /// layers, vertices from which no direction sees all faces around.
 ///
 /// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one. For a
-///   solid with cracks, so do those at rims that are closer than the distance.
+///   solid with cracks, so do those at rims that are closer than the distance, unless they lie on one stretch of a rim
+///   (`crack_vertices`), whose edges may be shorter than the distance.
 /// - Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish. For a
 ///   solid, these may be of any size, since they enclose nothing.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
