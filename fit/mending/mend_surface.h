@@ -57,7 +57,8 @@ struct MendedSurface {
 ///           without the faces that vanish). Faults that could not be removed are still there, and what `make_layers`
 ///           rejects may be, too.
 /// InputError: a vertex number that is out of range, a position that is not finite.
-/// Deterministic. Cost: that of `find_faults` if there are none; else up to a second for some hundred faults.
+/// Deterministic. Cost: that of `find_faults` if there are none; else up to a second for some hundred faults, and at
+/// most some ten seconds: the search for changes ends early at vertices with hundreds of triangles.
 MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance,
                            MendingGoal goal = MendingGoal::layers, const std::function<bool()>& cancelled = {});
 
