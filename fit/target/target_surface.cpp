@@ -7,7 +7,9 @@
 #include "subvol/fit/target/cloud_geometry.h"
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/fit/target/soup_topology.h"
+#include "subvol/surface/part_nesting.h"
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/surface_parts.h"
 
 #include <Eigen/Geometry>
 
@@ -51,11 +53,26 @@ double mended_volume(std::span<const Vec3> positions, std::span<const std::array
   }
 }
 
+/// Returns true if all closed parts of more than a volume face the way that their nesting asks for. The volumes of
+/// parts that do not would be taken off the sum instead of added, or the other way around.
+bool parts_agree(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double least) {
+  const SurfaceParts parts =
+      surface_parts({{positions.begin(), positions.end()}, {triangles.begin(), triangles.end()}});
+  if (parts.num_parts() <= 1) return true;
+  const PartNesting nesting = part_nesting(parts.surface.mesh, parts.part, static_cast<int>(parts.num_parts()));
+  for (std::size_t p = 0; p < parts.num_parts(); ++p)
+    if (parts.is_closed[p] && std::abs(nesting.volumes[p]) > least && !nesting.faces_out(p)) return false;
+  return true;
+}
+
 Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double area,
                    double closed_share) {
   const double bound = isoperimetric_bound(area);
-  const double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
-  if (closed_share == 1 && sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
+  double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
+  if (closed_share == 1 && sum > kFlatness * bound) {
+    if (parts_agree(positions, triangles, kFlatness * bound)) return {sum, VolumeSource::signed_sum};
+    sum = 0;
+  }
   if (const double mended = mended_volume(positions, triangles); mended > kFlatness * bound && mended <= bound)
     return {mended, VolumeSource::mended};
   if (sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};

@@ -35,11 +35,12 @@ const char* to_string(PointWeights weights);
 
 /// How the enclosed volume was found.
 enum class VolumeSource {
-  signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is closed and oriented, up to small gaps
-  mended,        ///< that sum after orienting triangles and closing holes (`solid_boundary`)
-  flood,         ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
-  isoperimetric, ///< half the volume of the sphere of equal area: the surface encloses nothing
-  given          ///< set by the caller
+  signed_sum,  ///< sum of the triangles' signed tetrahedra: the surface is closed, up to small gaps, and oriented, all
+               ///< of its parts as their nesting asks for
+  mended,      ///< that sum after orienting triangles and closing holes (`solid_boundary`)
+  flood,       ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
+  isoperimetric,  ///< half the volume of the sphere of equal area: the surface encloses nothing
+  given           ///< set by the caller
 };
 const char* to_string(VolumeSource source);
 

@@ -63,6 +63,34 @@ TEST_CASE("triangles turned over: the volume is that of the surface put right") 
   CHECK(target.volume() == Approx(exact));
 }
 
+TEST_CASE("parts that disagree about the outside: the volume is that of the parts put right") {
+  TriangleMesh mesh = cube_surface(4, false);
+  const TriangleMesh cube = mesh;
+  const auto add = [&](double size, const Vec3& at, bool turned) {
+    const auto first = static_cast<Index>(mesh.positions.size());
+    for (const Vec3& p : cube.positions) mesh.positions.push_back(size * p + at);
+    for (const auto& [a, b, c] : cube.triangles)
+      mesh.triangles.push_back({first + a, first + (turned ? c : b), first + (turned ? b : c)});
+  };
+  SECTION("a second solid that is inside out") {
+    add(0.5, Vec3(5, 0, 0), true);
+    const TargetSurface target(mesh);
+    CHECK(target.volume() == Approx(9));
+    CHECK(target.volume_source() == VolumeSource::mended);
+  }
+  SECTION("the wall of a void that points outward") {
+    add(0.5, Vec3::Zero(), false);
+    CHECK(TargetSurface(mesh).volume() == Approx(7));
+  }
+  SECTION("parts that agree have the plain sum") {
+    add(0.5, Vec3(5, 0, 0), false);
+    add(0.25, Vec3::Zero(), true);
+    const TargetSurface target(mesh);
+    CHECK(target.volume() == Approx(9 - 0.125));
+    CHECK(target.volume_source() == VolumeSource::signed_sum);
+  }
+}
+
 TEST_CASE("a hole is closed for the volume, wherever the surface lies") {
   TriangleMesh mesh = cube_surface(8, false);
   mesh.triangles.resize(mesh.triangles.size() - 40);
