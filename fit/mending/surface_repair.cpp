@@ -40,6 +40,12 @@ std::size_t num_obstacles(const SurfaceDiagnosis& diagnosis) {
   return count;
 }
 
+/// Returns true if some closed parts point inward, and not the whole surface does.
+bool points_inward_in_part(const SurfaceDiagnosis& diagnosis) {
+  const SurfaceFinding* inward = diagnosis.find(SurfaceFault::part_inward);
+  return inward && std::cmp_less(inward->count, std::ranges::count_if(diagnosis.parts, &SurfacePart::is_closed));
+}
+
 /// Repairs what needs no change of a triangle's place: unites and turns parts, leaves sheets out.
 SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
                          const std::function<bool()>& cancelled, RegionRule rule) {
@@ -72,7 +78,9 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
     repair.surface = surface;
     repair.done.push_back(sheets + "; they are left out, and the regions are one");
   }
-  const std::string turned = words(SurfaceFault::wall_outward);
+  std::vector<std::string> turned;
+  if (diagnosis.find(SurfaceFault::wall_outward)) turned.push_back(words(SurfaceFault::wall_outward));
+  if (points_inward_in_part(diagnosis)) turned.push_back(words(SurfaceFault::part_inward));
   bool united = false;
   if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
     PartUnion parts(surface_parts(surface), cancelled);
@@ -80,7 +88,7 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
     const std::size_t before = repair.done.size();
     TriangleMesh made = parts.made(repair.done);
     united = repair.done.size() > before;
-    if (!turned.empty()) repair.done.push_back(turned + "; turned");
+    for (const std::string& parts_turned : turned) repair.done.push_back(parts_turned + "; turned");
     if (!repair.done.empty()) {
       made.face_groups = groups_of_pieces(surface, made);
       repair.surface = std::move(made);

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -175,6 +176,26 @@ TEST_CASE("Sheets divide the inside only of surfaces that do not cross everywher
   const SurfaceRepair repair = repair_surface(with_soup(400));  // triangles inside of the wrap may leave voids
   CHECK(repair.is_fillable);
   CHECK(internal::signed_volume_of(repair.surface) == Approx(8).epsilon(0.1));
+}
+
+TEST_CASE("A part that points inward beside others that do not is turned", "[mending]") {
+  TriangleMesh cubes = cube_surface(2, false);
+  const TriangleMesh other = cubes;
+  const auto first = static_cast<Index>(cubes.positions.size());
+  for (const Vec3& p : other.positions) cubes.positions.push_back(p / 2 + Vec3(5, 0, 0));
+  for (const auto& [a, b, c] : other.triangles) cubes.triangles.push_back({first + a, first + c, first + b});
+  const SurfaceRepair repair = repair_surface(cubes);
+  CHECK(repair.is_fillable);
+  REQUIRE(repair.done.size() == 1);
+  CHECK(repair.done[0].find("1 part points inward") != std::string::npos);
+  CHECK(repair.done[0].ends_with("; turned"));
+  CHECK(internal::signed_volume_of(repair.surface) == Approx(9));
+  // A surface that is inside out as a whole stays as it is.
+  for (auto& t : cubes.triangles)
+    if (t[0] < first) std::swap(t[1], t[2]);
+  const SurfaceRepair same = repair_surface(cubes);
+  CHECK(same.done.empty());
+  CHECK(same.surface.triangles == cubes.triangles);
 }
 
 TEST_CASE("A fin is left out before a surface is filled", "[mending]") {
