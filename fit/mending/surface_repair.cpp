@@ -225,21 +225,20 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
 }
 
-}  // namespace
-
-SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+/// `repair_surface`, whose result counts only if it was not cancelled.
+SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
   if (rule != RegionRule::keep && diagnosis.find(SurfaceFault::face_contact))
     if (const std::optional<OneSidedSurface> one = without_second_sides(given)) {
-      SurfaceRepair repair = repair_surface(one->surface, cancelled, rule);
+      SurfaceRepair repair = repaired(one->surface, cancelled, rule);
       repair.done.insert(
           repair.done.begin(),
           formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
       return repair;
     }
   if (std::optional<TidySurface> tidy = tidy_surface(given, diagnosis)) {
-    SurfaceRepair repair = repair_surface(tidy->surface, cancelled, rule);
+    SurfaceRepair repair = repaired(tidy->surface, cancelled, rule);
     repair.done.insert(repair.done.begin(), tidy->done.begin(), tidy->done.end());
     return repair;
   }
@@ -265,6 +264,22 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
                   "be grown on it (`shell`)",
                   100 * covered->area_share));
   return std::move(*attempt.repair);
+}
+
+}  // namespace
+
+SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  if (!cancelled) return repaired(given, {}, rule);
+  // Steps that are cancelled leave the surface in any state, or do not find what they look for.
+  bool is_cancelled = false;
+  const std::function<bool()> ask = [&] { return is_cancelled = is_cancelled || cancelled(); };
+  try {
+    SurfaceRepair repair = repaired(given, ask, rule);
+    if (!is_cancelled) return repair;
+  } catch (const InputError&) {
+    if (!is_cancelled) throw;
+  }
+  return {.surface = given};
 }
 
 std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted) {
