@@ -86,12 +86,13 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
     PartUnion parts(surface_parts(surface), cancelled);
     if (!parts.group()) return repair;
     const std::size_t before = repair.done.size();
-    TriangleMesh made = parts.made(repair.done);
+    std::optional<TriangleMesh> made = parts.made(repair.done);
+    if (!made) return repair;
     united = repair.done.size() > before;
     for (const std::string& parts_turned : turned) repair.done.push_back(parts_turned + "; turned");
     if (!repair.done.empty()) {
-      made.face_groups = groups_of_pieces(surface, made);
-      repair.surface = std::move(made);
+      made->face_groups = groups_of_pieces(surface, *made);
+      repair.surface = std::move(*made);
     }
   }
   const SurfaceDiagnosis after = united ? diagnose(repair.surface, cancelled) : SurfaceDiagnosis{};
