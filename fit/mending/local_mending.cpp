@@ -18,6 +18,11 @@
 namespace subvol::internal {
 namespace {
 
+/// Pairs of a changed triangle and one near it at one fault, and at all of them, after which the search for changes
+/// ends. A million of them take about 20 ms; a fault among triangles of the usual shape takes a sixth of that.
+constexpr std::size_t kMostWorkAtFault = 10'000'000, kMostWork = 500'000'000;
+constexpr std::size_t kBoxesPerPair = 100;  ///< boxes that are compared in the time of one pair
+
 /// Mends one surface.
 class LocalMender {
  public:
@@ -55,6 +60,7 @@ class LocalMender {
   std::vector<Vec3> given_;
   std::vector<std::vector<Index>> around_;  ///< triangles at each vertex
   std::vector<char> is_touched_;            ///< triangles that were changed in this round
+  std::size_t work_ = 0;                    ///< done so far, in pairs of triangles tested
   int num_pair_searches_ = 0;               ///< faults for which two changes at a time were tried
   std::vector<Eigen::AlignedBox3d> changed_;  ///< boxes of the triangles that changed, before and after, in order
   /// A fault that no change mended.
@@ -144,6 +150,7 @@ MendingPatch LocalMender::patch_around(const std::vector<Index>& seeds, std::vec
     if (count == 1 && patch.is_inner[edge.first] && patch.is_inner[edge.second])
       patch.is_border[edge.first] = patch.is_border[edge.second] = 1;
   for (const Index v : first) seed_vertices.push_back(number.at(v));
+  patch.index();
   return patch;
 }
 
@@ -196,52 +203,62 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
   constexpr int kMostPairSearches = 20;  // each takes up to a second on large patches
   if (is_hopeless(seeds)) return false;
   std::vector<Index> triangles, vertices, seed_vertices;
-  const MendingPatch patch = patch_around(seeds, triangles, vertices, seed_vertices);
+  MendingPatch patch = patch_around(seeds, triangles, vertices, seed_vertices);
   std::vector<Vec3> given;
   for (const Index v : vertices) given.push_back(given_[v]);
   const PatchFaults given_faults = faults_of(patch);
   const PatchRating before = rating_of(given_faults, 0, goal_);
   struct Trial {
     PatchRating rating;
-    PatchFaults faults;
-    MendingPatch patch;
     std::vector<MendingChange> changes;
   };
   std::vector<Trial> trials;
-  const auto try_all = [&](const MendingPatch& from, const PatchFaults& known,
-                           const std::vector<MendingChange>& first) {
-    for (const MendingChange& change : possible_changes(from, seed_vertices, given, distance_)) {
-      if (is_cancelled()) return;
-      MendingPatch changed = from;
-      if (!changed.apply(change)) continue;
+  std::size_t work = 0;  // at this fault
+  const auto try_all = [&](const PatchFaults& known, const std::vector<MendingChange>& first) {
+    for (const MendingChange& change : possible_changes(patch, seed_vertices, given, distance_)) {
+      if (is_cancelled() || work > kMostWorkAtFault || work_ > kMostWork) return;
+      PatchUndo replaced;
+      if (!patch.apply(change, replaced)) continue;
       std::vector<MendingChange> all = first;
       all.push_back(change);
       double distance = 0;
       for (const MendingChange& one : all) distance += one.distance;
-      PatchFaults faults = faults_of(changed, &from, &known);
-      const PatchRating rating = rating_of(faults, distance, goal_);
-      trials.push_back({rating, std::move(faults), std::move(changed), std::move(all)});
+      const FaultsAfter after(patch, replaced, known);
+      trials.push_back({after.rating(distance, goal_), std::move(all)});
+      patch.undo(replaced);
+      const std::size_t pairs = after.work() + patch.mesh.triangles.size() / kBoxesPerPair;
+      work += pairs;
+      work_ += pairs;
     }
   };
   const auto best = [&] {
     return std::min_element(trials.begin(), trials.end(),
                             [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
   };
-  try_all(patch, given_faults, {});
+  try_all(given_faults, {});
   if (is_cancelled()) return false;
   if (!trials.empty() && best()->rating.faults >= before.faults && num_pair_searches_++ < kMostPairSearches) {
     std::stable_sort(trials.begin(), trials.end(),
                      [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
     const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
-    for (const Trial& trial : first) try_all(trial.patch, trial.faults, trial.changes);
+    for (const Trial& trial : first) {
+      PatchUndo replaced;
+      patch.apply(trial.changes[0], replaced);
+      try_all(FaultsAfter(patch, replaced, given_faults).faults(), trial.changes);
+      patch.undo(replaced);
+    }
   }
   if (is_cancelled()) return false;
   if (trials.empty() || best()->rating.faults >= before.faults) {
     failures_[seeds] = {patch.box, changed_.size()};
     return false;
   }
-  const Trial& chosen = *best();
-  accept(chosen.patch, chosen.changes, triangles, vertices);
+  const std::vector<MendingChange> chosen = best()->changes;
+  for (const MendingChange& change : chosen) {
+    PatchUndo replaced;
+    patch.apply(change, replaced);
+  }
+  accept(patch, chosen, triangles, vertices);
   return true;
 }
 

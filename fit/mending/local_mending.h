@@ -34,7 +34,8 @@ struct LocalMending {
 /// distance  largest change, in the mesh's unit: length of edges that collapse, distance of the diagonals of a flip,
 ///           way of a vertex from where it was.
 /// goal      decides what is a fault.
-/// Faults for which no change helps are left, and if there are more than a thousand, all are.
+/// Faults for which no change helps are left, and if there are more than a thousand, all are. At a fault among hundreds
+/// of triangles that are all near each other, only the first changes are tried.
 LocalMending mend_locally(TriangleMesh& mesh, double distance, MendingGoal goal,
                           const std::function<bool()>& cancelled);
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/mending/mend_surface.h"
 
-#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mending/local_mending.h"
+#include "subvol/fit/mending/near_vertices.h"
 #include "subvol/fit/mending/surface_faults.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/by_number.h"
@@ -41,32 +41,13 @@ void require_valid(const PolygonMesh& surface) {
       throw InputError("a face names vertex " + std::to_string(v) + " of " + std::to_string(surface.positions.size()));
 }
 
-/// Returns for each vertex the smallest number of a vertex that it is to become: of those given, one within a distance,
-/// directly or through others.
-std::vector<Index> merged_numbers(std::span<const Vec3> positions, std::vector<Index> order, double distance) {
-  DisjointSets sets(positions.size());
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return positions[a].x() != positions[b].x() ? positions[a].x() < positions[b].x() : a < b;
-  });
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const Vec3 &p = positions[order[i]], &q = positions[order[j]];
-      if (q.x() - p.x() > distance) break;
-      if ((q - p).norm() > distance) continue;
-      sets.join(order[i], order[j]);
-    }
-  std::vector<Index> numbers(positions.size());
-  for (std::size_t v = 0; v < numbers.size(); ++v) numbers[v] = sets.of(static_cast<Index>(v));
-  return numbers;
-}
-
-/// Returns the vertices at edges of one triangle, ascending.
-std::vector<Index> vertices_at_rims(const TriangleMesh& mesh) {
-  std::set<Index> vertices;
+/// Returns the edges of one triangle, by their vertices.
+std::vector<std::array<Index, 2>> rim_edges(const TriangleMesh& mesh) {
+  std::vector<std::array<Index, 2>> rims;
   for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> edge) {
-    if (edge.size() == 1) vertices.insert({edge[0].low, edge[0].high});
+    if (edge.size() == 1) rims.push_back({edge[0].low, edge[0].high});
   });
-  return {vertices.begin(), vertices.end()};
+  return rims;
 }
 
 /// A surface of triangles on which the steps of the mending work, one after the other.
@@ -88,10 +69,8 @@ class Mender {
   }
 
   void merge_vertices();
-  void close_rims() { merge(vertices_at_rims(mesh_), distance_); }
+  void close_rims();
   void drop_repeated_faces();
-  /// From here on, the surface as it is now counts as the given one when the distance is measured.
-  void compare_with_present() { reference_ = mesh_; }
   void split_fans();
   /// Returns false if cancelled.
   bool mend_locally();
@@ -99,13 +78,17 @@ class Mender {
 
  private:
   void drop(const std::vector<char>& is_dropped);
-  void merge(std::vector<Index> vertices, double distance);
+  /// Makes vertices one: those with the same entry.
+  void merge(std::span<const Index> number);
 
   const PolygonMesh& given_;
   double distance_, diagonal_ = 0;
   MendingGoal goal_;
   const std::function<bool()>& cancelled_;
-  TriangleMesh mesh_, reference_;  ///< of the reference, only the places count
+  TriangleMesh mesh_;
+  /// The surface from which the distance is measured: as it was given, for solids without the faces that enclose
+  /// nothing.
+  TriangleMesh reference_;
   std::vector<Index> vertex_numbers_, face_numbers_;
   MendedSurface counts_;
 };
@@ -125,12 +108,13 @@ void Mender::drop(const std::vector<char>& is_dropped) {
 void Mender::merge_vertices() {
   std::vector<Index> all(mesh_.positions.size());
   std::iota(all.begin(), all.end(), 0);
-  merge(std::move(all), std::min(distance_, kRounding * diagonal_));
+  merge(near_vertices(mesh_.positions, all, std::min(distance_, kRounding * diagonal_)));
 }
 
-/// Merges those of some vertices that are within a distance.
-void Mender::merge(std::vector<Index> vertices, double distance) {
-  const std::vector<Index> number = merged_numbers(mesh_.positions, std::move(vertices), distance);
+/// Merges vertices on both sides of cracks.
+void Mender::close_rims() { merge(crack_vertices(mesh_.positions, rim_edges(mesh_), distance_)); }
+
+void Mender::merge(std::span<const Index> number) {
   std::set<Index> merged;
   std::vector<char> is_dropped(mesh_.triangles.size(), 0);
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -159,6 +143,16 @@ void Mender::drop_repeated_faces() {
     const bool both = !sides[0].empty() && !sides[1].empty();
     for (const auto& faces : sides)
       for (std::size_t i = both ? 0 : 1; i < faces.size(); ++i) is_dropped[faces[i]] = 1;
+  }
+  if (goal_ != MendingGoal::layers) {
+    // They enclose nothing, and may be of any size: they do not count when the distance is measured.
+    std::vector<char> counts(reference_.triangles.size(), 1);
+    for (std::size_t t = 0; t < is_dropped.size(); ++t)
+      if (is_dropped[t]) counts[face_numbers_[t]] = 0;
+    std::size_t kept = 0;
+    for (std::size_t f = 0; f < counts.size(); ++f)
+      if (counts[f]) reference_.triangles[kept++] = reference_.triangles[f];
+    reference_.triangles.resize(kept);
   }
   drop(is_dropped);
 }
@@ -265,7 +259,7 @@ MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, 
     return result;
   };
   if (!(distance > 0) || surface.num_faces() == 0 || !has_only_triangles(surface)) return unchanged(surface, tags);
-  const bool has_cracks = goal == MendingGoal::solid_with_cracks && !vertices_at_rims(triangulate(surface)).empty();
+  const bool has_cracks = goal == MendingGoal::solid_with_cracks && !rim_edges(triangulate(surface)).empty();
   if (!has_cracks && has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
     return unchanged(surface, tags);
   if (cancelled && cancelled()) return ended(unchanged(surface, tags));
@@ -273,7 +267,6 @@ MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, 
   mender.merge_vertices();
   if (has_cracks) mender.close_rims();
   mender.drop_repeated_faces();
-  if (goal != MendingGoal::layers) mender.compare_with_present();
   mender.split_fans();
   if (!mender.mend_locally()) return ended(unchanged(surface, tags));
   MendedSurface result = mender.result(tags);

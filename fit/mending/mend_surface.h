@@ -40,7 +40,8 @@ struct MendedSurface {
 /// layers, vertices from which no direction sees all faces around.
 ///
 /// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one. For a
-///   solid with cracks, so do those at rims that are closer than the distance.
+///   solid with cracks, so do those at rims that are closer than the distance, unless they lie on one stretch of a rim
+///   (`crack_vertices`), whose edges may be shorter than the distance.
 /// - Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish. For a
 ///   solid, these may be of any size, since they enclose nothing.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
@@ -56,7 +57,8 @@ struct MendedSurface {
 ///           without the faces that vanish). Faults that could not be removed are still there, and what `make_layers`
 ///           rejects may be, too.
 /// InputError: a vertex number that is out of range, a position that is not finite.
-/// Deterministic. Cost: that of `find_faults` if there are none; else up to a second for some hundred faults.
+/// Deterministic. Cost: that of `find_faults` if there are none; else up to a second for some hundred faults, and at
+/// most some ten seconds: the search for changes ends early at vertices with hundreds of triangles.
 MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance,
                            MendingGoal goal = MendingGoal::layers, const std::function<bool()>& cancelled = {});
 

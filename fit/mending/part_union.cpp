@@ -9,18 +9,18 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 
 namespace subvol::internal {
 
 PartUnion::PartUnion(SurfaceParts parts, const std::function<bool()>& cancelled)
-    : parts_(std::move(parts)), cancelled_(cancelled) {
+    : parts_(std::move(parts)), cancelled_(cancelled), groups_(parts_.num_parts()) {
   nesting_ = part_nesting(mesh(), parts_.part, static_cast<int>(parts_.num_parts()));
   turn_parts_outward(parts_);
-  group_.resize(parts_.num_parts());
-  std::iota(group_.begin(), group_.end(), 0);
+  triangles_of_.resize(parts_.num_parts());
+  for (std::size_t t = 0; t < parts_.part.size(); ++t) triangles_of_[parts_.part[t]].push_back(static_cast<Index>(t));
 }
 
 std::string PartUnion::text_of(const Meeting& meeting) const {
@@ -30,7 +30,7 @@ std::string PartUnion::text_of(const Meeting& meeting) const {
 
 bool PartUnion::group() {
   const SelfIntersections found = self_intersections(mesh(), cancelled_);
-  if (cancelled_ && cancelled_()) return false;
+  if (is_cancelled()) return false;
   const auto join = [&](Index t, Index s, bool is_contact) {
     const auto a = static_cast<std::size_t>(parts_.part[t]), b = static_cast<std::size_t>(parts_.part[s]);
     if (root(a) == root(b) || !parts_.is_closed[a] || !parts_.is_closed[b]) return;
@@ -41,7 +41,7 @@ bool PartUnion::group() {
     const TriangleMeeting meeting = meeting_of(corners(t), corners(s));
     if (!is_contact && meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) return;
     meetings_.push_back({a, b, meeting.place});
-    group_[std::max(root(a), root(b))] = std::min(root(a), root(b));
+    groups_.join(static_cast<Index>(a), static_cast<Index>(b));
   };
   for (const auto& [t, s] : found.pairs) join(t, s, false);
   for (const auto& [t, s] : edge_contacts(parts_)) join(t, s, true);
@@ -50,27 +50,26 @@ bool PartUnion::group() {
 
 TriangleMesh PartUnion::part(std::size_t p) const {
   TriangleMesh result;
-  std::vector<Index> number(mesh().positions.size(), kNoIndex);
-  for (std::size_t t = 0; t < mesh().triangles.size(); ++t) {
-    if (static_cast<std::size_t>(parts_.part[t]) != p) continue;
+  std::unordered_map<Index, Index> number;
+  for (const Index t : triangles_of_[p]) {
     std::array<Index, 3> corners = mesh().triangles[t];
     for (Index& v : corners) {
-      if (number[v] == kNoIndex) {
-        number[v] = static_cast<Index>(result.positions.size());
-        result.positions.push_back(mesh().positions[v]);
-      }
-      v = number[v];
+      const auto [found, is_new] = number.try_emplace(v, static_cast<Index>(result.positions.size()));
+      if (is_new) result.positions.push_back(mesh().positions[v]);
+      v = found->second;
     }
     result.triangles.push_back(corners);
   }
   return result;
 }
 
-TriangleMesh PartUnion::united_group(std::size_t group) const {
+std::optional<TriangleMesh> PartUnion::united_group(std::span<const std::size_t> members,
+                                                    std::span<const Meeting> meetings) const {
   std::optional<TriangleMesh> whole;
   for (const bool voids : {false, true})
-    for (std::size_t p = 0; p < group_.size(); ++p) {
-      if (root(p) != group || nesting_.is_void(p) != voids) continue;
+    for (const std::size_t p : members) {
+      if (nesting_.is_void(p) != voids) continue;
+      if (is_cancelled()) return std::nullopt;
       TriangleMesh next = part(p);
       if (voids)
         for (auto& t : next.triangles) std::swap(t[1], t[2]);
@@ -80,27 +79,29 @@ TriangleMesh PartUnion::united_group(std::size_t group) const {
         whole = voids ? without(*whole, next) : united(*whole, next);
       if (whole) continue;
       const auto meeting =
-          std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return m.a == p || m.b == p; });
-      throw InputError("target: " + text_of(meeting == meetings_.end() ? meetings_.front() : *meeting) +
+          std::find_if(meetings.begin(), meetings.end(), [&](const Meeting& m) { return m.a == p || m.b == p; });
+      throw InputError("target: " + text_of(meeting == meetings.end() ? meetings.front() : *meeting) +
                        " and cannot be united: a part meets itself, or parts also touch along an edge or at a vertex");
     }
-  return std::move(*whole);
+  return whole;
 }
 
-TriangleMesh PartUnion::made(std::vector<std::string>& done) const {
+std::optional<TriangleMesh> PartUnion::made(std::vector<std::string>& done) {
+  std::vector<std::vector<std::size_t>> members(parts_.num_parts());
+  std::vector<std::vector<Meeting>> meetings(parts_.num_parts());
+  for (std::size_t p = 0; p < members.size(); ++p) members[root(p)].push_back(p);
+  for (const Meeting& meeting : meetings_) meetings[root(meeting.a)].push_back(meeting);
   TriangleMesh result;
-  for (std::size_t p = 0; p < group_.size(); ++p) {
-    if (root(p) != p) continue;
-    const auto members =
-        std::count_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
-    TriangleMesh one = members == 0 ? part(p) : united_group(p);
+  for (std::size_t p = 0; p < members.size(); ++p) {
+    if (members[p].empty()) continue;
+    const bool is_alone = meetings[p].empty();
+    std::optional<TriangleMesh> one = is_alone ? part(p) : united_group(members[p], meetings[p]);
+    if (!one) return std::nullopt;
     const auto first = static_cast<Index>(result.positions.size());
-    result.positions.insert(result.positions.end(), one.positions.begin(), one.positions.end());
-    for (const auto& [a, b, c] : one.triangles) result.triangles.push_back({first + a, first + b, first + c});
-    if (members == 0) continue;
-    const auto meeting =
-        std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
-    done.push_back("target: " + text_of(*meeting) + "; " + std::to_string(members + 1) +
+    result.positions.insert(result.positions.end(), one->positions.begin(), one->positions.end());
+    for (const auto& [a, b, c] : one->triangles) result.triangles.push_back({first + a, first + b, first + c});
+    if (is_alone) continue;
+    done.push_back("target: " + text_of(meetings[p].front()) + "; " + std::to_string(members[p].size()) +
                    " parts that cross or overlap are united");
   }
   return result;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <cstddef>
 #include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,9 +22,9 @@ class PartUnion {
   PartUnion(SurfaceParts parts, const std::function<bool()>& cancelled);
   /// Finds out which parts cross or overlap. Returns false if cancelled.
   bool group();
-  /// Returns the surface of the union, without groups of faces, and adds a sentence for each group of parts to `done`.
-  /// InputError: parts cannot be united, with their place.
-  TriangleMesh made(std::vector<std::string>& done) const;
+  /// Returns the surface of the union, without groups of faces, and adds a sentence for each group of parts to `done`;
+  /// nothing if cancelled. InputError: parts cannot be united, with their place.
+  std::optional<TriangleMesh> made(std::vector<std::string>& done);
 
  private:
   struct Meeting {
@@ -29,19 +32,20 @@ class PartUnion {
     Vec3 place;
   };
   const TriangleMesh& mesh() const { return parts_.surface.mesh; }
-  std::size_t root(std::size_t p) const {
-    while (group_[p] != p) p = group_[p];
-    return p;
-  }
+  std::size_t root(std::size_t p) { return static_cast<std::size_t>(groups_.of(static_cast<Index>(p))); }
+  bool is_cancelled() const { return cancelled_ && cancelled_(); }
   TriangleMesh part(std::size_t p) const;
-  TriangleMesh united_group(std::size_t group) const;
+  /// members  parts, ascending.  meetings: those among them.
+  std::optional<TriangleMesh> united_group(std::span<const std::size_t> members,
+                                           std::span<const Meeting> meetings) const;
   std::string text_of(const Meeting& meeting) const;
 
   SurfaceParts parts_;
   PartNesting nesting_;
   const std::function<bool()>& cancelled_;
-  std::vector<std::size_t> group_;  ///< another part of the same group, or the part itself
-  std::vector<Meeting> meetings_;   ///< those that joined groups
+  DisjointSets groups_;                           ///< of parts that are to be united
+  std::vector<Meeting> meetings_;                 ///< those that joined groups
+  std::vector<std::vector<Index>> triangles_of_;  ///< of each part, ascending
 };
 
 }  // namespace subvol::internal

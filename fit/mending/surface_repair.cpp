@@ -40,6 +40,12 @@ std::size_t num_obstacles(const SurfaceDiagnosis& diagnosis) {
   return count;
 }
 
+/// Returns true if some closed parts point inward, and not the whole surface does.
+bool points_inward_in_part(const SurfaceDiagnosis& diagnosis) {
+  const SurfaceFinding* inward = diagnosis.find(SurfaceFault::part_inward);
+  return inward && std::cmp_less(inward->count, std::ranges::count_if(diagnosis.parts, &SurfacePart::is_closed));
+}
+
 /// Repairs what needs no change of a triangle's place: unites and turns parts, leaves sheets out.
 SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
                          const std::function<bool()>& cancelled, RegionRule rule) {
@@ -73,18 +79,21 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
     repair.surface = surface;
     repair.done.push_back(sheets + "; they are left out, and the regions are one");
   }
-  const std::string turned = words(SurfaceFault::wall_outward);
+  std::vector<std::string> turned;
+  if (diagnosis.find(SurfaceFault::wall_outward)) turned.push_back(words(SurfaceFault::wall_outward));
+  if (points_inward_in_part(diagnosis)) turned.push_back(words(SurfaceFault::part_inward));
   bool united = false;
   if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
     PartUnion parts(surface_parts(surface), cancelled);
     if (!parts.group()) return repair;
     const std::size_t before = repair.done.size();
-    TriangleMesh made = parts.made(repair.done);
+    std::optional<TriangleMesh> made = parts.made(repair.done);
+    if (!made) return repair;
     united = repair.done.size() > before;
-    if (!turned.empty()) repair.done.push_back(turned + "; turned");
+    for (const std::string& parts_turned : turned) repair.done.push_back(parts_turned + "; turned");
     if (!repair.done.empty()) {
-      made.face_groups = groups_of_pieces(surface, made);
-      repair.surface = std::move(made);
+      made->face_groups = groups_of_pieces(surface, *made);
+      repair.surface = std::move(*made);
     }
   }
   const SurfaceDiagnosis after = united ? diagnose(repair.surface, cancelled) : SurfaceDiagnosis{};
@@ -218,21 +227,20 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
 }
 
-}  // namespace
-
-SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+/// `repair_surface`, whose result counts only if it was not cancelled.
+SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
   if (rule != RegionRule::keep && diagnosis.find(SurfaceFault::face_contact))
     if (const std::optional<OneSidedSurface> one = without_second_sides(given)) {
-      SurfaceRepair repair = repair_surface(one->surface, cancelled, rule);
+      SurfaceRepair repair = repaired(one->surface, cancelled, rule);
       repair.done.insert(
           repair.done.begin(),
           formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
       return repair;
     }
   if (std::optional<TidySurface> tidy = tidy_surface(given, diagnosis)) {
-    SurfaceRepair repair = repair_surface(tidy->surface, cancelled, rule);
+    SurfaceRepair repair = repaired(tidy->surface, cancelled, rule);
     repair.done.insert(repair.done.begin(), tidy->done.begin(), tidy->done.end());
     return repair;
   }
@@ -258,6 +266,22 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
                   "be grown on it (`shell`)",
                   100 * covered->area_share));
   return std::move(*attempt.repair);
+}
+
+}  // namespace
+
+SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  if (!cancelled) return repaired(given, {}, rule);
+  // Steps that are cancelled leave the surface in any state, or do not find what they look for.
+  bool is_cancelled = false;
+  const std::function<bool()> ask = [&] { return is_cancelled = is_cancelled || cancelled(); };
+  try {
+    SurfaceRepair repair = repaired(given, ask, rule);
+    if (!is_cancelled) return repair;
+  } catch (const InputError&) {
+    if (!is_cancelled) throw;
+  }
+  return {.surface = given};
 }
 
 std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted) {

@@ -8,16 +8,16 @@
 #include "subvol/fit/geometry/triangle_meeting.h"
 #include "subvol/surface/corner_fans.h"
 #include "subvol/surface/part_nesting.h"
+#include "subvol/surface/rim_loops.h"
 #include "subvol/surface/surface_parts.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <numeric>
-#include <set>
+#include <span>
 #include <utility>
 
 namespace subvol {
@@ -70,7 +70,7 @@ class Diagnostician {
   void find_repeated();
   void find_edge_faults();
   void find_rims();
-  void add_rim(const std::vector<std::size_t>& loop);
+  void add_rim(std::span<const RimEdge> rim);
   void find_vertex_contacts();
   void find_nesting();
   void find_meetings();
@@ -146,43 +146,24 @@ void Diagnostician::find_edge_faults() {
   }
 }
 
-/// Follows the edges of one triangle from vertex to vertex.
 void Diagnostician::find_rims() {
-  std::multimap<Index, std::size_t> ends;  // positions in parts_.rims by vertex
-  for (std::size_t i = 0; i < parts_.rims.size(); ++i) {
-    const SurfaceHalfEdge& side = parts_.sides[parts_.rims[i]];
-    ends.emplace(side.low, i);
-    ends.emplace(side.high, i);
-  }
-  std::vector<char> used(parts_.rims.size(), 0);
-  for (std::size_t start = 0; start < used.size(); ++start) {
-    if (used[start]) continue;
-    std::vector<std::size_t> loop;
-    Index at = parts_.sides[parts_.rims[start]].low;
-    for (std::size_t next = start; next < used.size();) {
-      used[next] = 1;
-      loop.push_back(parts_.rims[next]);
-      const SurfaceHalfEdge& side = parts_.sides[parts_.rims[next]];
-      at = side.low == at ? side.high : side.low;
-      next = used.size();
-      for (auto [it, end] = ends.equal_range(at); it != end && next == used.size(); ++it)
-        if (!used[it->second]) next = it->second;
-    }
-    add_rim(loop);
-  }
+  std::vector<SurfaceHalfEdge> rims;
+  for (const std::size_t side : parts_.rims) rims.push_back(parts_.sides[side]);
+  for (const std::vector<RimEdge>& rim : rim_walks(rims, mesh_.positions.size())) add_rim(rim);
 }
 
-void Diagnostician::add_rim(const std::vector<std::size_t>& loop) {
+void Diagnostician::add_rim(std::span<const RimEdge> rim) {
   double length = 0;
   Vec3 mean = Vec3::Zero();
-  for (const std::size_t i : loop) {
-    const Vec3 &p = mesh_.positions[parts_.sides[i].low], &q = mesh_.positions[parts_.sides[i].high];
+  for (const RimEdge& edge : rim) {
+    const auto [low, high] = std::minmax(edge.from, edge.to);
+    const Vec3 &p = mesh_.positions[low], &q = mesh_.positions[high];
     length += (q - p).norm();
     mean += (p + q) / 2;
   }
-  SurfacePlace place = place_of(mean / static_cast<double>(loop.size()), parts_.sides[loop.front()].triangle);
+  SurfacePlace place = place_of(mean / static_cast<double>(rim.size()), rim.front().triangle);
   place.measure = length;
-  const bool is_pinhole = loop.size() > 2 && length <= kPinholePercent / 100 * result_.diagonal;
+  const bool is_pinhole = rim.size() > 2 && length <= kPinholePercent / 100 * result_.diagonal;
   add(is_pinhole ? SurfaceFault::pinhole : SurfaceFault::open_rim, std::move(place));
 }
 

@@ -7,7 +7,9 @@
 #include "subvol/fit/target/cloud_geometry.h"
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/fit/target/soup_topology.h"
+#include "subvol/surface/part_nesting.h"
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/surface_parts.h"
 
 #include <Eigen/Geometry>
 
@@ -28,6 +30,11 @@ constexpr double kClosedEnough = 0.95;  // share of paired half-edges above whic
 constexpr double kFlatness = 1e-6;      // share of the isoperimetric bound below which nothing is enclosed
 constexpr int kFloodResolution = 96;
 constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
+/// Samples up to which triangles are sampled along their whole length, however thin they are.
+constexpr std::size_t kManySamples = 2'000'000;
+/// Samples in a square of the spacing that triangles of a usual shape do not exceed: halving longest edges makes 4
+/// to 20.
+constexpr double kMostInSquare = 32;
 constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this count as 0
 
 /// Sizes of the cells of a cloud's grid, in units of its points' spacing: first cells with about ten points each if the
@@ -51,11 +58,26 @@ double mended_volume(std::span<const Vec3> positions, std::span<const std::array
   }
 }
 
+/// Returns true if all closed parts of more than a volume face the way that their nesting asks for. The volumes of
+/// parts that do not would be taken off the sum instead of added, or the other way around.
+bool parts_agree(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double least) {
+  const SurfaceParts parts =
+      surface_parts({{positions.begin(), positions.end()}, {triangles.begin(), triangles.end()}});
+  if (parts.num_parts() <= 1) return true;
+  const PartNesting nesting = part_nesting(parts.surface.mesh, parts.part, static_cast<int>(parts.num_parts()));
+  for (std::size_t p = 0; p < parts.num_parts(); ++p)
+    if (parts.is_closed[p] && std::abs(nesting.volumes[p]) > least && !nesting.faces_out(p)) return false;
+  return true;
+}
+
 Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double area,
                    double closed_share) {
   const double bound = isoperimetric_bound(area);
-  const double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
-  if (closed_share == 1 && sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
+  double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
+  if (closed_share == 1 && sum > kFlatness * bound) {
+    if (parts_agree(positions, triangles, kFlatness * bound)) return {sum, VolumeSource::signed_sum};
+    sum = 0;
+  }
   if (const double mended = mended_volume(positions, triangles); mended > kFlatness * bound && mended <= bound)
     return {mended, VolumeSource::mended};
   if (sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
@@ -192,17 +214,39 @@ void TargetSurface::resample(double spacing) {
   if (!(spacing >= 0) || !std::isfinite(spacing))
     throw InputError("TargetSurface: sample_spacing must be finite and >= 0");
   if (is_cloud()) return;
+  const double squares = spacing > 0 ? area_ / spacing / spacing : 0;
+  // Halving ends with parts of at most half a square.
+  if (!(2 * squares < static_cast<double>(kMaxSamples)))
+    throw InputError("TargetSurface: sample_spacing is too small for this target");
+  const std::size_t usual = triangles_.size() + static_cast<std::size_t>(kMostInSquare * squares);
+  if (!take_samples(spacing, std::max(kManySamples, usual), false)) take_samples(spacing, kMaxSamples, true);
+  sample_normals_.resize(samples_.size());
+  for (std::size_t j = 0; j < samples_.size(); ++j) sample_normals_[j] = normals_[sample_triangles_[j]];
+}
+
+bool TargetSurface::take_samples(double spacing, std::size_t most, bool thins_needles) {
   samples_.clear();
   sample_triangles_.clear();
   sample_areas_.clear();
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     const auto& [a, b, c] = triangles_[t];
+    const std::array<Vec3, 3> corners{positions_[a], positions_[b], positions_[c]};
     const std::size_t first = samples_.size();
-    add_samples({positions_[a], positions_[b], positions_[c]}, static_cast<Index>(t), spacing);
+    if (first >= kMaxSamples) throw InputError("TargetSurface: sample_spacing is too small for this target");
+    const std::size_t limit =
+        thins_needles
+            ? std::max<std::size_t>(1, static_cast<std::size_t>(kMostInSquare * areas_[t] / spacing / spacing))
+            : most - first;
+    add_samples(corners, spacing, first + limit);
+    if (samples_.size() > first + limit) {
+      if (!thins_needles) return false;
+      samples_.resize(first);
+      add_along_needle(corners, t, limit);
+    }
+    sample_triangles_.resize(samples_.size(), static_cast<Index>(t));
     sample_areas_.resize(samples_.size(), areas_[t] / static_cast<double>(samples_.size() - first));
   }
-  sample_normals_.resize(samples_.size());
-  for (std::size_t j = 0; j < samples_.size(); ++j) sample_normals_[j] = normals_[sample_triangles_[j]];
+  return true;
 }
 
 void TargetSurface::thin(std::size_t most) {
@@ -236,8 +280,8 @@ void TargetSurface::thin(std::size_t most) {
   sample_areas_.resize(kept);
 }
 
-void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing) {
-  if (samples_.size() >= kMaxSamples) throw InputError("TargetSurface: sample_spacing is too small for this target");
+void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, double spacing, std::size_t most) {
+  if (samples_.size() > most) return;
   if (spacing > 0) {
     int longest = 0;
     double squared[3];
@@ -248,13 +292,32 @@ void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, Index triang
     const Vec3 &a = corners[longest], &b = corners[(longest + 1) % 3], &c = corners[(longest + 2) % 3];
     const Vec3 middle = 0.5 * (a + b);
     if (squared[longest] > spacing * spacing && middle != a && middle != b) {
-      add_samples({a, middle, c}, triangle, spacing);
-      add_samples({middle, b, c}, triangle, spacing);
+      add_samples({a, middle, c}, spacing, most);
+      add_samples({middle, b, c}, spacing, most);
       return;
     }
   }
   samples_.push_back((corners[0] + corners[1] + corners[2]) / 3);
-  sample_triangles_.push_back(triangle);
+}
+
+void TargetSurface::add_along_needle(const std::array<Vec3, 3>& corners, std::size_t triangle, std::size_t count) {
+  int longest = 0;
+  for (int k = 1; k < 3; ++k)
+    if ((corners[(k + 1) % 3] - corners[k]).norm() > (corners[(longest + 1) % 3] - corners[longest]).norm())
+      longest = k;
+  const Vec3 &a = corners[longest], &b = corners[(longest + 1) % 3], &c = corners[(longest + 2) % 3];
+  const Vec3 along = b - a;
+  const double apex = std::clamp((c - a).dot(along) / along.squaredNorm(), 0.0, 1.0);  // place of c along the edge
+  // Multiples of the golden ratio spread the samples of a row of needles over their length.
+  const double offset = std::fmod(static_cast<double>(triangle + 1) * std::numbers::phi, 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double share = (static_cast<double>(i) + offset) / static_cast<double>(count);  // of the area, seen from a
+    const bool is_before = share < apex;
+    const double to_apex = is_before ? std::sqrt(share / apex) : std::sqrt((1 - share) / (1 - apex));
+    const Vec3 on_side = is_before ? Vec3(a + to_apex * (c - a)) : Vec3(b + to_apex * (c - b));
+    const double place = is_before ? to_apex * apex : 1 - to_apex * (1 - apex);
+    samples_.push_back(0.5 * (a + place * along + on_side));
+  }
 }
 
 }  // namespace subvol

@@ -35,11 +35,12 @@ const char* to_string(PointWeights weights);
 
 /// How the enclosed volume was found.
 enum class VolumeSource {
-  signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is closed and oriented, up to small gaps
-  mended,        ///< that sum after orienting triangles and closing holes (`solid_boundary`)
-  flood,         ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
-  isoperimetric, ///< half the volume of the sphere of equal area: the surface encloses nothing
-  given          ///< set by the caller
+  signed_sum,  ///< sum of the triangles' signed tetrahedra: the surface is closed, up to small gaps, and oriented, all
+               ///< of its parts as their nesting asks for
+  mended,      ///< that sum after orienting triangles and closing holes (`solid_boundary`)
+  flood,       ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
+  isoperimetric,  ///< half the volume of the sphere of equal area: the surface encloses nothing
+  given           ///< set by the caller
 };
 const char* to_string(VolumeSource source);
 
@@ -87,7 +88,8 @@ class TargetSurface {
   Vec3 center() const { return center_; }        ///< center of the bounding box
 
   /// Points on the surface: the barycenters of the triangles or, if an edge is longer than the spacing, those of the
-  /// parts that result from repeatedly halving the longest edge. For a cloud, its points.
+  /// parts that result from repeatedly halving the longest edge. If that would make millions, triangles far thinner
+  /// than the spacing have fewer, by their areas. For a cloud, its points.
   const std::vector<Vec3>& samples() const { return samples_; }
   /// The triangle that each sample lies in; empty for a cloud.
   const std::vector<Index>& sample_triangles() const { return sample_triangles_; }
@@ -112,7 +114,13 @@ class TargetSurface {
   TargetSurface() = default;
   /// Takes the triangles that have an area.
   void take_triangles(const TriangleMesh& mesh);
-  void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
+  /// Samples all triangles. Returns false, and leaves samples of some, if there would be more than `most`.
+  /// thins_needles  if triangles are far thinner than the spacing, the number of their samples depends on their areas.
+  bool take_samples(double spacing, std::size_t most, bool thins_needles);
+  /// Adds samples of a triangle; ends early if there are more than `most` in all.
+  void add_samples(const std::array<Vec3, 3>& corners, double spacing, std::size_t most);
+  /// Adds samples in equal parts of the area of a thin triangle.
+  void add_along_needle(const std::array<Vec3, 3>& corners, std::size_t triangle, std::size_t count);
   void set_box(const Vec3& low, const Vec3& high);
 
   mutable std::shared_ptr<const internal::GroupedClosestPoint> tree_, tree_by_group_;

@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mending/near_vertices.h"
 #include "subvol/fit/mending/surface_faults.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/shell/shell.h"
@@ -14,10 +15,13 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <numeric>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {
@@ -50,7 +54,67 @@ void check_mended(const MendedSurface& mended, double distance) {
   CHECK(mended.face_numbers.size() == mended.surface.num_faces());
 }
 
+/// A cylinder of diameter and height 1 without its top, whose rims have `n` vertices. If it has a slit, the faces at
+/// the first vertices of the rims have vertices of their own on one side, a width away.
+TriangleMesh cup(Index n, double slit = 0) {
+  TriangleMesh mesh{{Vec3::Zero()}, {}};
+  for (const double z : {0.0, 1.0})
+    for (Index k = 0; k < n; ++k) {
+      const double angle = 2 * std::acos(-1.0) * k / n;
+      mesh.positions.emplace_back(std::cos(angle) / 2, std::sin(angle) / 2, z);
+    }
+  for (Index k = 0; k < n; ++k) {
+    const Index a = 1 + k, b = 1 + (k + 1) % n;
+    mesh.triangles.push_back({0, b, a});
+    mesh.triangles.push_back({a, b, n + b});
+    mesh.triangles.push_back({a, n + b, n + a});
+  }
+  if (slit > 0) {
+    const auto first = static_cast<Index>(mesh.positions.size());
+    for (const Index v : {Index{1}, 1 + n}) mesh.positions.push_back(mesh.positions[v] - Vec3(0, slit, 0));
+    for (auto t = mesh.triangles.end() - 3; t != mesh.triangles.end(); ++t)
+      for (Index& v : *t) v = v == 1 ? first : v == 1 + n ? first + 1 : v;
+  }
+  return mesh;
+}
+
 }  // namespace
+
+TEST_CASE("A rim of short edges does not collapse when cracks close, and a slit beside it closes", "[mending]") {
+  constexpr double kDistance = 0.05;
+  constexpr Index kNumSides = 200;  // edges of 0.016
+  const TriangleMesh open = cup(kNumSides);
+  const MendedSurface same = mend_surface(as_polygons(open), {}, kDistance, MendingGoal::solid_with_cracks);
+  CHECK(same.merged_vertices == 0);
+  CHECK(same.surface.num_faces() == open.triangles.size());
+  const TriangleMesh slit = cup(kNumSides, 0.003);
+  const MendedSurface closed = mend_surface(as_polygons(slit), {}, kDistance, MendingGoal::solid_with_cracks);
+  CHECK(closed.merged_vertices == 2);
+  CHECK(closed.surface.num_faces() == slit.triangles.size());
+  CHECK(closed.surface.positions.size() == open.positions.size());
+  CHECK(closed.distance > 1e-4);  // from the surface with the slit
+  CHECK(closed.distance <= 0.003 * (1 + 1e-9));
+}
+
+TEST_CASE("Vertices in a row become one only as far as the distance reaches", "[mending]") {
+  std::vector<Vec3> row;
+  std::vector<Index> all;
+  for (Index i = 0; i < 100; ++i) {
+    row.emplace_back(0.4 * i, 0, 0);
+    all.push_back(i);
+  }
+  const std::vector<Index> number = near_vertices(row, all, 1);
+  for (Index i = 0; i < 100; ++i) {
+    CHECK((row[number[i]] - row[i]).norm() <= 1);
+    CHECK(number[number[i]] == number[i]);
+  }
+  CHECK(number[2] == 0);
+  CHECK(number[3] == 3);
+  // Neighbors along a rim stay apart, and so do both ends of a short stretch of it; beyond a gap it is a crack.
+  const std::vector<std::array<Index, 2>> rims{{0, 1}, {1, 2}, {3, 4}};
+  const std::vector<Index> at_rims = crack_vertices(row, rims, 1);
+  CHECK(std::vector<Index>(at_rims.begin(), at_rims.begin() + 5) == std::vector<Index>{0, 1, 2, 2, 4});
+}
 
 TEST_CASE("A surface without faults is not mended, nor is one of quads", "[mending]") {
   const PolygonMesh cube = as_polygons(cube_surface(4, false));

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -175,6 +176,60 @@ TEST_CASE("Sheets divide the inside only of surfaces that do not cross everywher
   const SurfaceRepair repair = repair_surface(with_soup(400));  // triangles inside of the wrap may leave voids
   CHECK(repair.is_fillable);
   CHECK(internal::signed_volume_of(repair.surface) == Approx(8).epsilon(0.1));
+}
+
+TEST_CASE("A repair that is cancelled returns the surface as it was given, at whichever step", "[mending][slow]") {
+  const TriangleMesh cube = cube_surface(4, false);
+  TriangleMesh open = cube, finned = cube, crossing = cube, two_sided = cube, sheet = cube, untidy = folded_cube(0.001);
+  open.triangles.resize(open.triangles.size() - 20);
+  const auto [a, b, c] = cube.triangles[0];
+  const auto m = static_cast<Index>(cube.positions.size());
+  finned.triangles.push_back({a, b, m});
+  finned.positions.push_back(1.5 * cube.positions[a]);
+  for (const Vec3& p : cube.positions) crossing.positions.push_back(p + Vec3(1.1, 0.3, 0.2));
+  for (const auto& [i, j, k] : cube.triangles) crossing.triangles.push_back({m + i, m + j, m + k});
+  for (const auto& [i, j, k] : cube.triangles) two_sided.triangles.push_back({i, k, j});
+  sheet.positions.push_back(4 * cube.positions[a]);
+  sheet.positions.push_back(sheet.positions[m] + Vec3(3, -5, 0));
+  sheet.triangles.push_back({a, b, m});
+  sheet.triangles.push_back({b, m + 1, m});
+  std::swap(untidy.triangles[7][0], untidy.triangles[7][1]);
+  for (const TriangleMesh& given : {open, finned, crossing, two_sided, sheet, untidy, folded_cube(0.001)}) {
+    std::size_t calls = 0;
+    const SurfaceRepair whole = repair_surface(given, [&] { return ++calls, false; });
+    REQUIRE(whole.done.size() > 0);
+    const std::size_t all = calls;
+    for (std::size_t n = 1; n <= all; n = n < 4 || n == all ? n + 1 : std::min(n + n / 2, all)) {
+      calls = 0;
+      const SurfaceRepair repair = repair_surface(given, [&] { return ++calls == n; });
+      CAPTURE(n, all);
+      CHECK(repair.surface.triangles == given.triangles);
+      CHECK(repair.surface.positions == given.positions);
+      CHECK(repair.done.empty());
+      CHECK(repair.notes.empty());
+      CHECK_FALSE(repair.is_fillable);
+    }
+  }
+}
+
+TEST_CASE("A part that points inward beside others that do not is turned", "[mending]") {
+  TriangleMesh cubes = cube_surface(2, false);
+  const TriangleMesh other = cubes;
+  const auto first = static_cast<Index>(cubes.positions.size());
+  for (const Vec3& p : other.positions) cubes.positions.push_back(p / 2 + Vec3(5, 0, 0));
+  for (const auto& [a, b, c] : other.triangles) cubes.triangles.push_back({first + a, first + c, first + b});
+  const SurfaceRepair repair = repair_surface(cubes);
+  CHECK(repair.is_fillable);
+  REQUIRE(repair.done.size() == 1);
+  CHECK(repair.done[0].find("1 part points inward") != std::string::npos);
+  CHECK(repair.done[0].ends_with("; turned"));
+  CHECK(internal::signed_volume_of(repair.surface) == Approx(9));
+  // A surface that is inside out as a whole stays as it is.
+  for (auto& t : cubes.triangles)
+    if (t[0] < first) std::swap(t[1], t[2]);
+  const SurfaceRepair same = repair_surface(cubes);
+  CHECK(same.done.empty());
+  CHECK(same.surface.triangles == cubes.triangles);
 }
 
 TEST_CASE("A fin is left out before a surface is filled", "[mending]") {

@@ -9,6 +9,8 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -144,6 +146,37 @@ TEST_CASE("Holes are told with their rims, short ones as pinholes", "[diagnosis]
   CHECK(count(found, SurfaceFault::pinhole) == 1);
   CHECK(count(found, SurfaceFault::open_rim) == 0);
   CHECK(repair_surface(ball).notes.size() == 1);
+}
+
+TEST_CASE("Holes that touch at a vertex are several, and each is closed by itself", "[diagnosis]") {
+  TriangleMesh cube = test::cube_surface(4, false);
+  const auto at = [&](Index v) {
+    std::vector<std::size_t> around;
+    for (std::size_t t = 0; t < cube.triangles.size(); ++t)
+      if (std::ranges::count(cube.triangles[t], v) > 0) around.push_back(t);
+    return around;
+  };
+  std::array<std::size_t, 2> removed{};
+  for (Index v = 0; removed[1] == 0; ++v)
+    for (const std::size_t t : at(v))
+      for (const std::size_t s : at(v)) {
+        const auto& corners = cube.triangles[s];
+        if (std::ranges::count_if(cube.triangles[t], [&](Index w) { return std::ranges::count(corners, w) > 0; }) == 1)
+          removed = {std::min(t, s), std::max(t, s)};
+      }
+  for (const std::size_t t : {removed[1], removed[0]})
+    cube.triangles.erase(cube.triangles.begin() + static_cast<long>(t));
+  for (const bool disagrees : {false, true}) {
+    if (disagrees)
+      for (std::size_t t = 0; t < cube.triangles.size(); t += 3) std::swap(cube.triangles[t][0], cube.triangles[t][1]);
+    const SurfaceDiagnosis found = diagnose(cube);
+    CHECK(count(found, SurfaceFault::open_rim) + count(found, SurfaceFault::pinhole) == 2);
+    CHECK(found.find(SurfaceFault::open_rim)->places.front().measure < 2);  // of one triangle
+    const SolidBoundary solid = solid_boundary(cube);
+    CHECK(solid.closed_holes == 2);
+    CHECK(solid.topology == BettiNumbers{1, 0, 0});
+    CHECK(solid.volume == Approx(8));
+  }
 }
 
 TEST_CASE("A flap is a fin, and a sheet through the inside divides it into regions", "[diagnosis]") {

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -61,6 +62,34 @@ TEST_CASE("triangles turned over: the volume is that of the surface put right") 
   const TargetSurface target(mesh);
   CHECK(target.volume_source() == VolumeSource::mended);
   CHECK(target.volume() == Approx(exact));
+}
+
+TEST_CASE("parts that disagree about the outside: the volume is that of the parts put right") {
+  TriangleMesh mesh = cube_surface(4, false);
+  const TriangleMesh cube = mesh;
+  const auto add = [&](double size, const Vec3& at, bool turned) {
+    const auto first = static_cast<Index>(mesh.positions.size());
+    for (const Vec3& p : cube.positions) mesh.positions.push_back(size * p + at);
+    for (const auto& [a, b, c] : cube.triangles)
+      mesh.triangles.push_back({first + a, first + (turned ? c : b), first + (turned ? b : c)});
+  };
+  SECTION("a second solid that is inside out") {
+    add(0.5, Vec3(5, 0, 0), true);
+    const TargetSurface target(mesh);
+    CHECK(target.volume() == Approx(9));
+    CHECK(target.volume_source() == VolumeSource::mended);
+  }
+  SECTION("the wall of a void that points outward") {
+    add(0.5, Vec3::Zero(), false);
+    CHECK(TargetSurface(mesh).volume() == Approx(7));
+  }
+  SECTION("parts that agree have the plain sum") {
+    add(0.5, Vec3(5, 0, 0), false);
+    add(0.25, Vec3::Zero(), true);
+    const TargetSurface target(mesh);
+    CHECK(target.volume() == Approx(9 - 0.125));
+    CHECK(target.volume_source() == VolumeSource::signed_sum);
+  }
 }
 
 TEST_CASE("a hole is closed for the volume, wherever the surface lies") {
@@ -157,6 +186,27 @@ TEST_CASE("triangles without area are dropped, positions of no triangle are igno
   const TargetSurface target(mesh);
   CHECK(target.triangles().size() == mesh.triangles.size() - 1);
   CHECK(target.diagonal() == Approx(std::sqrt(12.)));
+}
+
+TEST_CASE("a row of needles has samples by its area, spread over its length, and not millions") {
+  TriangleMesh strip;  // 1 x 1
+  constexpr Index kNumNeedles = 20'000;
+  for (Index i = 0; i <= kNumNeedles; ++i)
+    for (const double z : {0.0, 1.0}) strip.positions.emplace_back(static_cast<double>(i) / kNumNeedles, 0, z);
+  for (Index i = 0; i < kNumNeedles; ++i) {
+    strip.triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1});
+    strip.triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  }
+  const TargetSurface target(strip, {.sample_spacing = 0.01, .volume = 1});  // needles: 100 spacings long, 0.005 wide
+  CHECK(target.samples().size() <= 32 * 10'000 + strip.triangles.size());
+  CHECK(std::accumulate(target.sample_areas().begin(), target.sample_areas().end(), 0.0) == Approx(1));
+  std::vector<double> area(400, 0);  // of squares of side 0.05
+  for (std::size_t j = 0; j < target.samples().size(); ++j) {
+    const Vec3& p = target.samples()[j];
+    REQUIRE((p.x() > 0 && p.x() < 1 && p.z() > 0 && p.z() < 1));
+    area[static_cast<std::size_t>(20 * p.x()) + 20 * static_cast<std::size_t>(20 * p.z())] += target.sample_areas()[j];
+  }
+  for (const double a : area) CHECK(a == Approx(1.0 / 400).epsilon(0.15));
 }
 
 TEST_CASE("samples are barycenters, or those of parts no longer than the spacing") {
