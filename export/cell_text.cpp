@@ -133,33 +133,49 @@ void append_line(std::string& text, std::initializer_list<std::size_t> numbers) 
   text += '\n';
 }
 
-/// Returns a name for a .msh: on one line, without quotes, and no longer than Gmsh reads.
-std::string gmsh_name(std::string name) {
-  constexpr std::size_t kLongest = 126;
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  std::replace(name.begin(), name.end(), '"', '\'');
-  if (name.size() <= kLongest) return name;
-  std::size_t end = kLongest;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;  // not within a character
+constexpr std::size_t kLongestGmshName = 126;
+
+/// Cuts a name to so many bytes, not within a character.
+std::string cut_name(const std::string& name, std::size_t longest) {
+  if (name.size() <= longest) return name;
+  std::size_t end = longest;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
   return name.substr(0, end);
 }
 
+/// Names of a .msh. Names that differ stay different when they are cut: those behind the first get a number.
+class GmshNames {
+ public:
+  std::string take(const std::string& wanted) {
+    std::string name = gmsh_name(wanted);
+    for (int n = 2; names_.try_emplace(name, wanted).first->second != wanted; ++n) {
+      const std::string number = ' ' + std::to_string(n);
+      name = cut_name(gmsh_name(wanted), kLongestGmshName - number.size()) + number;
+    }
+    return name;
+  }
+
+ private:
+  std::map<std::string, std::string> names_;  ///< what each was made of
+};
+
 std::string region_name(const CellView& mesh, int reference) {
   for (const Group& region : mesh.regions)
-    if (region.number == reference && !region.name.empty()) return gmsh_name(region.name);
+    if (region.number == reference && !region.name.empty()) return region.name;
   return "reference " + std::to_string(reference);
 }
 
 void append_physical_names(std::string& text, const CellView& mesh, const std::map<int, int>& groups) {
   const std::size_t num_surfaces = mesh.faces ? mesh.faces->groups.size() : 0;
   text += "$PhysicalNames\n" + std::to_string(num_surfaces + groups.size()) + "\n";
+  GmshNames of_surfaces, of_volumes;
   if (mesh.faces) {
     const std::vector<int> numbers = physical_surfaces(mesh.faces->groups);
     for (std::size_t g = 0; g < num_surfaces; ++g)
-      text += "2 " + std::to_string(numbers[g]) + " \"" + gmsh_name(label_of(mesh.faces->groups[g])) + "\"\n";
+      text += "2 " + std::to_string(numbers[g]) + " \"" + of_surfaces.take(label_of(mesh.faces->groups[g])) + "\"\n";
   }
   for (const auto& [reference, group] : groups)
-    text += "3 " + std::to_string(group) + " \"" + region_name(mesh, reference) + "\"\n";
+    text += "3 " + std::to_string(group) + " \"" + of_volumes.take(region_name(mesh, reference)) + "\"\n";
   text += "$EndPhysicalNames\n";
 }
 
@@ -338,6 +354,13 @@ int gmsh_type(CellKind kind, int order) {
 int gmsh_face_type(std::size_t num_corners, int order) {
   assert(order >= 1 && order <= static_cast<int>(std::size(kGmshTriangles)));
   return num_corners == 3 ? kGmshTriangles[order - 1] : kGmshQuads[order - 1];
+}
+
+std::string gmsh_name(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  std::replace(name.begin(), name.end(), '"', '\'');
+  return cut_name(name, kLongestGmshName);
 }
 
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells) {

@@ -54,6 +54,9 @@ void turn_wedge(std::int64_t* corners);
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields, MshVersion version = MshVersion::v4_1);
 
+/// Returns a name as a .msh holds it: on one line, without quotes, and at most 126 bytes, which is what Gmsh reads.
+std::string gmsh_name(std::string name);
+
 /// Throws InputError unless there is one finite number per cell, or none at all.
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);
 

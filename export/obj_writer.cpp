@@ -4,8 +4,8 @@
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/version.h"
 #include "subvol/export/text_format.h"
+#include "subvol/export/written_names.h"
 
-#include <algorithm>
 #include <set>
 #include <span>
 #include <string>
@@ -24,9 +24,7 @@ std::vector<std::string> group_names(std::span<const Group> groups) {
   std::vector<std::string> names;
   std::set<std::string> taken;
   for (const Group& group : groups) {
-    std::string word = label_of(group);
-    std::replace_if(
-        word.begin(), word.end(), [](unsigned char c) { return c <= ' ' || c == '#' || c == '\\'; }, '_');
+    const std::string word = name_in_file(".obj", label_of(group));
     std::string name = word;
     for (int n = 2; !taken.insert(name).second; ++n) name = word + '_' + std::to_string(n);
     names.push_back(std::move(name));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/losses.h"
 #include "cli/runs/outputs.h"
 #include "cli/runs/scene_chord.h"
 #include "cli/runs/shell_output.h"
@@ -80,8 +81,9 @@ struct Writing {
   }
 };
 
-void write_volume_mesh(const Writing& writing, const VolumeMesh& mesh) {
+void write_volume_mesh(Writing& writing, const VolumeMesh& mesh) {
   const cli::Output output = writing.output({cli::Part::cutaway, cli::Part::boundary});
+  cli::warn_of_names(cli::marks_of(mesh), {&output, 1}, writing.warnings);
   if (!writing.limit || !cli::shows_surface(output)) return cli::write_output(output, mesh, writing.options);
   const TessellatedSurface limit = cli::tessellated_limit(mesh, writing.options);
   cli::write_output(output, mesh, mesh, &limit, writing.options);
@@ -89,6 +91,7 @@ void write_volume_mesh(const Writing& writing, const VolumeMesh& mesh) {
 
 void write_curved(Writing& writing, const CurvedMesh& curved) {
   const cli::Output output = writing.output({cli::Part::cutaway, cli::Part::boundary});
+  cli::warn_of_names(cli::marks_of(curved), {&output, 1}, writing.warnings);
   cli::write_output(output, curved, writing.options);
   writing.judge(output, curved.mesh);
 }
@@ -101,6 +104,8 @@ void write_fit(Writing& writing, const Fitted& fit) {
   if (output.part == cli::Part::animation)
     return fit.curved ? cli::write_animation(output, fit.curved->mesh, fit.states, writing.options)
                       : cli::write_animation(output, *fit.cage, *fit.mesh, fit.states, writing.options);
+  cli::warn_of_names(fit.curved ? cli::marks_of(*fit.curved) : cli::marks_of(*fit.mesh), {&output, 1},
+                     writing.warnings);
   if (fit.curved) {
     cli::write_output(output, *fit.curved, writing.options);
     return writing.judge(output, fit.curved->mesh);
@@ -112,6 +117,7 @@ void write_fit(Writing& writing, const Fitted& fit) {
 
 void write_shell(Writing& writing, const Shelled& result) {
   const cli::Output output = writing.output({cli::Part::cage, cli::Part::cutaway});
+  cli::warn_of_names(cli::marks_of(result.shell.mesh), {&output, 1}, writing.warnings);
   if (!result.curved_shell) return cli::write_shell(output, result.shell, writing.options);
   cli::write_shell(output, result.shell, *result.curved_shell, writing.options);
   writing.judge(output, result.curved_shell->mesh);
@@ -136,14 +142,19 @@ void write(const py::object& path, const py::object& object, const py::kwargs& g
   const bool done =
       written<VolumeMesh>(object, [&](const VolumeMesh& mesh) { write_volume_mesh(writing, mesh); }) ||
       written<CurvedMesh>(object, [&](const CurvedMesh& curved) { write_curved(writing, curved); }) ||
-      written<SurfaceMesh>(object, [&](const SurfaceMesh& surface) {
-        cli::write_output(writing.output({cli::Part::boundary}), surface.polygons, writing.options);
-      }) ||
+      written<SurfaceMesh>(object,
+                           [&](const SurfaceMesh& surface) {
+                             const cli::Output output = writing.output({cli::Part::boundary});
+                             cli::warn_of_names(cli::marks_of(surface.polygons), {&output, 1}, writing.warnings);
+                             cli::write_output(output, surface.polygons, writing.options);
+                           }) ||
       written<Fitted>(object, [&](const Fitted& fit) { write_fit(writing, fit); }) ||
       written<Filled>(object, [&](const Filled& result) { write_volume_mesh(writing, *result.mesh); }) ||
-      written<Optimized>(object, [&](const Optimized& result) {
-        result.curved ? write_curved(writing, *result.curved) : write_volume_mesh(writing, *result.mesh);
-      }) ||
+      written<Optimized>(object,
+                         [&](const Optimized& result) {
+                           result.curved ? write_curved(writing, *result.curved)
+                                         : write_volume_mesh(writing, *result.mesh);
+                         }) ||
       written<Shelled>(object, [&](const Shelled& shell) { write_shell(writing, shell); });
   if (!done)
     throw py::type_error("write: expected a mesh or a result, not " +

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/losses.h"
 
+#include "subvol/export/written_names.h"
 #include "subvol/io/left_out.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 namespace subvol::cli {
 
@@ -80,8 +82,10 @@ std::string shared_faces_lost(const Output& output, std::span<const SharedGroup>
     const std::size_t faces = of_boundary ? group.boundary_faces : group.faces,
                       lost = of_boundary ? group.boundary_lost : group.lost;
     if (lost == 0 || ++num_groups > kMostListed) continue;
-    list += (list.empty() ? "" : ", ") + quoted_label(group.label) + " loses " +
-            (lost == faces ? "all" : std::to_string(lost)) + " of its " + std::to_string(faces) + " faces";
+    list +=
+        (list.empty() ? "" : ", ") + quoted_label(group.label) + " loses " +
+        (faces == 1 ? "its only face"
+                    : (lost == faces ? "all" : std::to_string(lost)) + " of its " + std::to_string(faces) + " faces");
   }
   if (list.empty()) return {};
   if (num_groups > kMostListed) list += ", and " + std::to_string(num_groups - kMostListed) + " more groups lose faces";
@@ -89,20 +93,69 @@ std::string shared_faces_lost(const Output& output, std::span<const SharedGroup>
          list + "; take .msh, .vtu, .inp or .e";
 }
 
+/// Returns what an output loses of names, in words; empty if nothing.
+std::string names_lost(const Output& output, std::span<const Group> named) {
+  if (output.part == Part::boundary || output.part == Part::cutaway || output.part == Part::region || output.is_page())
+    return {};
+  const FileFormat& format = output.format();
+  std::size_t num_lost = 0, num_altered = 0;
+  std::string first_lost, first_altered;
+  for (const Group& group : named) {
+    const Held held = group.dimension == 2 ? format.groups_written : format.regions_written;
+    if (held == Held::numbers && ++num_lost == 1) first_lost = quoted_label(label_of(group));
+    if (held != Held::names) continue;
+    const std::string name = internal::name_in_file(output.extension, group.name);
+    if (name != group.name && ++num_altered == 1)
+      first_altered = quoted_label(label_of(group)) + (name.empty() ? " to its number" : " to " + quoted_label(name));
+  }
+  const auto names = [](std::size_t n) { return n == 1 ? std::string("1 name") : std::to_string(n) + " names"; };
+  std::string told;
+  if (num_lost > 0)
+    told = "this format holds numbers of groups and regions, not names: " + names(num_lost) + " left out, the first " +
+           first_lost;
+  if (num_altered > 0)
+    told += (told.empty() ? "" : "; ") + names(num_altered) +
+            " altered, since this format does not hold all names: " + "the first, " + first_altered;
+  return told.empty() ? told : output.path.string() + ": " + told;
+}
+
+/// Returns the groups and regions that have names; regions only if there are references to them.
+std::vector<Group> named_groups(std::span<const Group> face_groups, std::span<const Group> regions,
+                                std::span<const int> references) {
+  std::vector<Group> named;
+  const auto add = [&](const Group& group, int dimension) {
+    if (!group.name.empty()) named.push_back({group.name, group.number, dimension});
+  };
+  for (const Group& group : face_groups) add(group, 2);
+  const std::set<int> used(references.begin(), references.end());
+  for (const Group& region : regions)
+    if (used.contains(region.number)) add(region, 3);
+  return named;
+}
+
 }  // namespace
 
 Marks marks_of(const VolumeMesh& mesh) {
   std::optional<MeshTopology> topology;
   const auto shared = shared_groups(mesh.face_groups, [&]() -> const MeshTopology& { return topology.emplace(mesh); });
-  return {num_set(mesh.references), mesh.tags.creases.size(), mesh.tags.corners.size(), mesh.face_groups.groups.size(),
-          shared};
+  return {num_set(mesh.references),
+          mesh.tags.creases.size(),
+          mesh.tags.corners.size(),
+          mesh.face_groups.groups.size(),
+          shared,
+          named_groups(mesh.face_groups.groups, mesh.regions, mesh.references)};
 }
 
 Marks marks_of(const HighOrderFile& file) {
-  return {
-      .references = num_set(file.references),
-      .groups = file.face_groups.groups.size(),
-      .shared = shared_groups(file.face_groups, [&]() -> const MeshTopology& { return file.mesh.space.topology(); })};
+  const auto topology = [&]() -> const MeshTopology& { return file.mesh.space.topology(); };
+  return {.references = num_set(file.references),
+          .groups = file.face_groups.groups.size(),
+          .shared = shared_groups(file.face_groups, topology),
+          .named = named_groups(file.face_groups.groups, file.regions, file.references)};
+}
+
+Marks marks_of(const PolygonMesh& surface) {
+  return {.groups = surface.face_groups.groups.size(), .named = named_groups(surface.face_groups.groups, {}, {})};
 }
 
 void warn_of_losses(const Marks& read, const Marks& result, std::span<const Output> outputs,
@@ -117,8 +170,12 @@ void warn_of_losses(const Marks& read, const Marks& result, std::span<const Outp
   if (!keeps_tags || result.corners == 0) lost.add("corners", read.corners);
   if (!keeps_groups || result.groups == 0) lost.add("groups of faces", read.groups);
   if (!lost.empty()) warnings.push_back("read, but in none of the outputs: " + lost.text());
+}
+
+void warn_of_names(const Marks& result, std::span<const Output> outputs, std::vector<std::string>& warnings) {
   for (const Output& output : outputs)
-    if (const std::string told = shared_faces_lost(output, result.shared); !told.empty()) warnings.push_back(told);
+    for (const std::string& told : {shared_faces_lost(output, result.shared), names_lost(output, result.named)})
+      if (!told.empty()) warnings.push_back(told);
 }
 
 }  // namespace subvol::cli

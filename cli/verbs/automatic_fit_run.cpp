@@ -105,6 +105,7 @@ void AutomaticFitRun::fit() {
   groups_ = carry_groups(surface(), result_.mesh);
   if (has_cage()) carry_groups(surface(), result_.cage);
   add_warnings(groups_.warnings);
+  add_warnings_of_names(marks_of(result_.mesh));
 }
 
 void AutomaticFitRun::write() {

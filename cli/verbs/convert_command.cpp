@@ -27,7 +27,9 @@ struct ConvertArguments {
 void convert_volume(const ConvertArguments& arguments, VolumeMesh mesh, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (!arguments.region.empty()) mesh = cells_of_region(mesh, arguments.region);
-  warn_of_losses(marks_of(mesh), marks_of(mesh), outputs, warnings);
+  const Marks marks = marks_of(mesh);
+  warn_of_losses(marks, marks, outputs, warnings);
+  warn_of_names(marks, outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) {
     if (arguments.limit && !output.is_volume() && !output.is_scene() && output.extension != ".usda") {
       write_polygons(output, tessellated_limit(mesh, writing), writing);
@@ -47,6 +49,7 @@ int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& f
   for (const Output& output : outputs) require_for_curved_cells(output, file.mesh.space.max_order());
   const Marks marks = marks_of(file);
   warn_of_losses(marks, marks, outputs, warnings, true);
+  warn_of_names(marks, outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
   const std::vector<PolynomialCells> polynomials =
       check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, [&](const HighOrderMesh& mesh) {
@@ -62,7 +65,7 @@ int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& f
 }
 
 void convert_surface(const ConvertArguments& arguments, const PolygonMesh& surface, std::vector<Output>& outputs,
-                     const WritingOptions& writing) {
+                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit)
     throw UsageError("--limit: " + arguments.input + " is a surface, and the limit surface is that of cells");
   for (const Output& output : outputs) {
@@ -72,6 +75,7 @@ void convert_surface(const ConvertArguments& arguments, const PolygonMesh& surfa
       throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
     }
   }
+  warn_of_names(marks_of(surface), outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, surface, writing); }));
 }
 
@@ -95,7 +99,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
     if (!arguments.region.empty()) *curved = cells_of_region(*curved, arguments.region);
     status = convert_high_order(arguments, *curved, outputs, writing, warnings);
   } else {
-    convert_surface(arguments, std::get<PolygonMesh>(mesh), outputs, writing);
+    convert_surface(arguments, std::get<PolygonMesh>(mesh), outputs, writing, warnings);
   }
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';

@@ -180,6 +180,7 @@ void FitRun::fit() {
   groups_ = carry_groups(outer_, result_.mesh);
   carry_groups(outer_, result_.cage);
   add_warnings(groups_.warnings);
+  add_warnings_of_names(marks_of(result_.mesh));
 }
 
 void FitRun::write() {

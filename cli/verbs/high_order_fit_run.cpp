@@ -197,6 +197,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const auto [regions, outer] = fitted_target(target, template_mesh);
   const GroupsFound groups = carry_groups(outer, file);
   warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
+  warn_of_names(marks_of(file), outputs, warnings);
   tell_warnings();
   const std::vector<std::string> failures = write_each(outputs, [&](const Output& output) {
     if (output.part == Part::animation)

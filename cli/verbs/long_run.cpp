@@ -35,6 +35,12 @@ void LongRun::add_warnings(const std::vector<std::string>& warnings) {
   tell_warnings();
 }
 
+void LongRun::add_warnings_of_names(const Marks& result) {
+  std::vector<std::string> warnings;
+  warn_of_names(result, outputs_, warnings);
+  add_warnings(warnings);
+}
+
 void LongRun::write_report(Json json, const Json& parts) const {
   if (run_.report.empty()) return;
   Json seconds = seconds_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/interrupt.h"
+#include "cli/runs/losses.h"
 #include "cli/runs/outputs.h"
 #include "cli/runs/progress.h"
 #include "cli/runs/run_options.h"
@@ -29,6 +30,8 @@ class LongRun {
   /// Prints the warnings that have not been printed yet.
   void tell_warnings();
   void add_warnings(const std::vector<std::string>& warnings);
+  /// Adds those of `warn_of_names`, before a result is written.
+  void add_warnings_of_names(const Marks& result);
 
   /// Does one part and records how long it took.
   template <class Run>

@@ -26,6 +26,7 @@ CurvedOptimizeRun::CurvedOptimizeRun(const OptimizeArguments& arguments, const L
       throw UsageError(std::string(option) + ": not for curved cells without --target, whose boundary keeps its shape");
   for (const Output& output : outputs_) require_for_curved_cells(output, file_.mesh.space.max_order());
   require_regions(outputs_, regions_of(labels_of(file_)));
+  warn_of_losses(marks_of(file_), marks_of(file_), outputs_, warnings_, true);
 }
 
 void CurvedOptimizeRun::optimize() {
@@ -46,6 +47,7 @@ void CurvedOptimizeRun::optimize() {
   checkpointing_->finish(result.report.warnings);
   add_warnings(result.report.warnings);
   file_.mesh = std::move(result.mesh);
+  add_warnings_of_names(marks_of(file_));
   fit_ = std::move(result.report);
 }
 

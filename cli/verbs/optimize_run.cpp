@@ -111,6 +111,7 @@ void OptimizeRun::optimize() {
   add_warnings(result_.report.warnings);
   if (target_) groups_ = carry_groups(*target_, result_.mesh);
   add_warnings(groups_.warnings);
+  add_warnings_of_names(marks_of(result_.mesh));
 }
 
 void OptimizeRun::write() {

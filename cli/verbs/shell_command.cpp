@@ -195,6 +195,7 @@ void ShellRun::curve() {
 }
 
 void ShellRun::write() {
+  add_warnings_of_names(marks_of(result_.mesh));
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.surface;
   writing.options = options_of_result(verb_);

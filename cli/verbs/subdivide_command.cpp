@@ -76,7 +76,9 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
                               : subdivide_repeatedly(cage, arguments.levels,
                                                      has_limit ? BoundaryRule::catmull_clark : BoundaryRule::averaging);
 
-  warn_of_losses(read, marks_of(fine), outputs, warnings);
+  const Marks result = marks_of(fine);
+  warn_of_losses(read, result, outputs, warnings);
+  warn_of_names(result, outputs, warnings);
   warn_of_volumes(cage, fine, warnings);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;

@@ -2,6 +2,7 @@
 #include "cli/verbs/template_command.h"
 
 #include "cli/runs/exit_status.h"
+#include "cli/runs/losses.h"
 #include "cli/runs/outputs.h"
 #include "cli/runs/written_result.h"
 #include "cli/verbs/verb_options.h"
@@ -33,9 +34,11 @@ int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Out
   writing.options = options_of_result(verb);
   Json report{{"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
   report.update(details);
+  std::vector<std::string> warnings = run.warnings;
+  warn_of_names(marks_of(mesh), outputs, warnings);
   return write_checked(
-      run.run, std::move(outputs), mesh, [&](const Output& output) { write_output(output, mesh, writing); },
-      run.warnings, report);
+      run.run, std::move(outputs), mesh, [&](const Output& output) { write_output(output, mesh, writing); }, warnings,
+      report);
 }
 
 void add_template_command(CLI::App& app, Action& action) {

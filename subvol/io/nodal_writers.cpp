@@ -45,15 +45,8 @@ void append_inp_position(std::string& text, const Vec3& p) {
 class SetNames {
  public:
   std::string take(const std::string& wanted, const std::string& otherwise) {
-    constexpr std::size_t kLongest = 72;  // Abaqus allows 80
-    std::string name;
-    for (const char c : wanted.substr(0, kLongest)) {
-      const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-      name += is_letter || (c >= '0' && c <= '9') || c == '-' ? c : '_';
-    }
-    if (name.find_first_not_of('_') == std::string::npos) name = otherwise;
-    const char first = name[0];
-    if (!((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z'))) name = "N" + name;
+    std::string name = inp_name(wanted);
+    if (name.empty()) name = otherwise;
     std::string free = name;
     for (int i = 2; !taken_.insert(lower_case(free)).second; ++i) free = name + "_" + std::to_string(i);
     return free;
@@ -159,6 +152,15 @@ void append_nastran_card(std::string& text, std::string name, const std::vector<
 }
 
 }  // namespace
+
+std::string inp_name(const std::string& wanted) {
+  constexpr std::size_t kLongest = 72;  // Abaqus allows 80
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  std::string name;
+  for (const char c : wanted.substr(0, kLongest)) name += is_letter(c) || (c >= '0' && c <= '9') || c == '-' ? c : '_';
+  if (name.find_first_not_of('_') == std::string::npos) return {};
+  return is_letter(name[0]) ? name : "N" + name;
+}
 
 std::vector<std::size_t> exodus_order(const NodalMesh& mesh) {
   std::vector<std::size_t> order(mesh.num_cells());

@@ -17,6 +17,9 @@ namespace subvol::internal {
 ///
 /// InputError: orders other than 1 and 2, or both of them; nodes that are not equally spaced.
 std::string inp_text(const NodalMesh& mesh);
+/// Returns a name as such a file holds it: letters, digits, _ and -, a letter first, at most 73 characters; empty if no
+/// letter or digit is left.
+std::string inp_name(const std::string& wanted);
 
 /// Returns the cells as bulk data of Nastran, with large fields: GRID, CTETRA, CPENTA, CPYRAM and CHEXA, of order 2
 /// with the middles of edges as above. The number of a property is the reference, or, for those below 1, the first free

@@ -24,7 +24,7 @@ std::vector<std::string> told_of_losses(const cli::Marks& marks, const std::stri
   const std::filesystem::path path(file);
   const Output output{.part = part, .path = path, .extension = path.extension().string()};
   std::vector<std::string> warnings;
-  cli::warn_of_losses(marks, marks, std::vector{output}, warnings);
+  cli::warn_of_names(marks, std::vector{output}, warnings);
   return warnings;
 }
 
@@ -60,4 +60,34 @@ TEST_CASE("A format with one group for each face tells which groups lose faces",
     CHECK(told_of_losses(marks, file).empty());
   }
   CHECK(told_of_losses(cli::marks_of(with_floor_and_roof(lattice(2, 2, 2), 2)), "a.mesh").empty());
+}
+
+TEST_CASE("Names that a format leaves out or alters are told once for each output, with the first of them", "[cli]") {
+  VolumeMesh mesh = with_floor_and_roof(lattice(2, 2, 2), 2);
+  mesh.face_groups.groups[1].name = "gro\xc3\x9f es Dach";
+  mesh.references = {3, 3, 3, 3, 4, 4, 4, 4};
+  mesh.regions = {{"steel", 3, 3}, {"never used", 9, 3}};
+  const cli::Marks marks = cli::marks_of(mesh);
+  const auto only = [&](const std::string& file, const cli::Marks& of) {
+    const std::vector<std::string> warnings = told_of_losses(of, file);
+    CAPTURE(file);
+    REQUIRE(warnings.size() == 1);
+    CHECK(has(warnings[0], file + ": "));
+    return warnings[0];
+  };
+  CHECK(has(only("a.mfem", marks), "3 names left out, the first \"floor\""));
+  for (const char* file : {"a.vtk", "a.bdf"}) CHECK(has(only(file, marks), "1 name left out, the first \"steel\""));
+  CHECK(has(only("a.inp", marks), "1 name altered"));
+  CHECK(has(only("a.inp", marks), "\"gro\xc3\x9f es Dach\" to \"gro___es_Dach\""));
+  CHECK(has(only("a.obj", marks), "to \"gro\xc3\x9f_es_Dach\""));
+  for (const char* file : {"a.mesh", "a.msh", "a.vtu", "a.e", "a.glb", "a.usda", "a.3mf"}) {
+    CAPTURE(file);
+    CHECK(told_of_losses(marks, file).empty());
+  }
+  mesh.face_groups.groups[0].name = std::string(130, 'x');
+  CHECK(has(only("a.msh", cli::marks_of(mesh)), "1 name altered"));
+  PolygonMesh surface;
+  surface.face_groups.groups = {{"inlet", 1, 2}};
+  CHECK(has(only("a.ply", cli::marks_of(surface)), "1 name left out, the first \"inlet\""));
+  CHECK(told_of_losses(cli::marks_of(surface), "a.vtp").empty());
 }

@@ -82,6 +82,20 @@ TEST_CASE("a .msh has a physical surface for each group, behind the cells") {
   CHECK_THAT(msh_text(other), Contains("$PhysicalNames\n1\n3 4 \"reference 4\"\n"));
 }
 
+TEST_CASE("names of a .msh that are cut stay different") {
+  VolumeMesh mesh = lattice(2, 1, 1);
+  const std::string same(125, 'n');
+  mesh.references = {1, 2};
+  mesh.regions = {{same + "ab1", 1, 3}, {same + "ab2", 2, 3}};
+  mesh.face_groups.groups = {{same + "\xc3\x9f", 1, 2}, {same + "\xc3\xa4", 2, 2}, {"a\"b", 3, 2}, {"a'b", 4, 2}};
+  const std::string text = msh_text(mesh);
+  CHECK(text.find("3 1 \"" + same + "a\"\n") != std::string::npos);
+  CHECK(text.find("3 2 \"" + same.substr(0, 124) + " 2\"\n") != std::string::npos);
+  CHECK(text.find("2 1 \"" + same + "\"\n") != std::string::npos);
+  CHECK(text.find("2 2 \"" + same.substr(0, 124) + " 2\"\n") != std::string::npos);
+  CHECK(text.find("2 3 \"a'b\"\n2 4 \"a'b 2\"\n") != std::string::npos);
+}
+
 TEST_CASE("faces of curved cells have the points of the cells") {
   PointSource source(1);
   const VolumeMesh cells = grouped_cells();
