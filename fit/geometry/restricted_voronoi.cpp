@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 namespace subvol::internal {
 
@@ -79,6 +80,11 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
     for (Index v : t)
       if (v < 0 || static_cast<std::size_t>(v) >= positions.size())
         throw InputError("RestrictedVoronoi::compute: triangle corners must be in [0, positions.size())");
+  if (!std::ranges::all_of(positions, [](const Vec3& p) { return p.allFinite(); }))
+    for (const auto& t : triangles)
+      for (Index v : t)
+        if (!positions[v].allFinite())
+          throw InputError("RestrictedVoronoi::compute: position " + std::to_string(v) + " is not finite");
   std::vector<Vec3> moved;
   std::vector<Index> nearest;
   locate(positions, center_, tree_, moved, nearest);

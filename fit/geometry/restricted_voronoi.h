@@ -55,7 +55,7 @@ class RestrictedVoronoi {
 
   /// Returns the pieces of all triangles, ordered by triangle, then by site; at most one per pair.
   ///
-  /// positions, triangles   finite; corners in [0, positions.size()), else InputError. Soups are allowed.
+  /// positions, triangles   corners finite and in [0, positions.size()), else InputError. Soups are allowed.
   /// pieces                 receives the result; its memory is reused.
   ///
   /// Triangles without area have no pieces. Runs in parallel over triangles; same bits for any number of threads.

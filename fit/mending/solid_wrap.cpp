@@ -46,14 +46,14 @@ std::string cause(const SurfaceDiagnosis& diagnosis) {
 
 /// Mean distance from a wrap to the surface above which it is of something else, in percent of the diagonal: half a
 /// voxel. Wraps of solids with faults have at most a tenth of it.
-constexpr double kMostWrapPercent = 0.25;
+constexpr double kMostMeanPercent = 0.25;
 
 /// Returns how far a wrap is from the surface that was given, in words. InputError: it is of something else.
 std::string how_far(const TriangleMesh& wrap, const TriangleMesh& given, double diagonal, const std::string& why) {
   const SurfaceDistance distance = surface_distance(wrap, given);
   const SurfaceDistance::Extreme& farthest = distance.max_a_to_b;
   const double mean = 100 * distance.mean_a_to_b / diagonal;
-  if (mean > kMostWrapPercent)
+  if (mean > kMostMeanPercent)
     throw InputError(
         formatted("target: %sit bounds no solid: even a wrap of it is %.3g %% off on average", why.c_str(), mean));
   return formatted("the wrap is %.3g %% off the surface on average, and at most %.3g %%, at (%.6g, %.6g, %.6g)", mean,

@@ -2,6 +2,7 @@
 #include "subvol/fit/mending/tidy_surface.h"
 
 #include "subvol/base/format.h"
+#include "subvol/surface/orientation.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -49,12 +50,7 @@ std::size_t drop_repeated(TriangleMesh& surface) {
 /// Turns triangles that lie against the majority of their part, if the part can be oriented; parts end at edges of more
 /// than two triangles. Returns how many.
 std::size_t turn_minorities(TriangleMesh& surface) {
-  const std::size_t num_triangles = surface.triangles.size();
-  struct Neighbor {
-    Index triangle;
-    bool disagrees;
-  };
-  std::vector<std::vector<Neighbor>> neighbors(num_triangles);
+  std::vector<std::vector<TriangleNeighbor>> neighbors(surface.triangles.size());
   const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(surface.triangles, surface.positions.size());
   for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> edge) {
     if (edge.size() != 2) return;
@@ -62,34 +58,7 @@ std::size_t turn_minorities(TriangleMesh& surface) {
     neighbors[edge[0].triangle].push_back({edge[1].triangle, disagrees});
     neighbors[edge[1].triangle].push_back({edge[0].triangle, disagrees});
   });
-  enum class Turn : std::uint8_t { unknown, keep, turn };
-  std::vector<Turn> turns(num_triangles, Turn::unknown);
-  std::vector<Index> to_turn;
-  for (std::size_t seed = 0; seed < num_triangles; ++seed) {
-    if (turns[seed] != Turn::unknown) continue;
-    turns[seed] = Turn::keep;
-    std::vector<Index> part{static_cast<Index>(seed)}, turned;
-    bool can_be_oriented = true;
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      const Index t = part[i];
-      if (turns[t] == Turn::turn) turned.push_back(t);
-      for (const Neighbor& neighbor : neighbors[t]) {
-        const Turn wanted = (turns[t] == Turn::turn) != neighbor.disagrees ? Turn::turn : Turn::keep;
-        if (turns[neighbor.triangle] == Turn::unknown) {
-          turns[neighbor.triangle] = wanted;
-          part.push_back(neighbor.triangle);
-        } else if (turns[neighbor.triangle] != wanted) {
-          can_be_oriented = false;
-        }
-      }
-    }
-    if (!can_be_oriented) continue;
-    const bool is_majority = 2 * turned.size() > part.size();
-    for (const Index t : part)
-      if ((turns[t] == Turn::turn) != is_majority) to_turn.push_back(t);
-  }
-  for (const Index t : to_turn) std::swap(surface.triangles[t][1], surface.triangles[t][2]);
-  return to_turn.size();
+  return orient_parts(surface, neighbors).turned;
 }
 
 using Edge = std::array<Index, 2>;  ///< ascending

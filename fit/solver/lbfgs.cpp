@@ -103,8 +103,13 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
     std::vector<Vec3> d = direction(history, gradient);
     double slope = dot(gradient, d);
     if (!(slope < 0)) {
-      result.stop = MinimizerStop::converged;
-      result.explanation = "the gradient vanishes";
+      const bool vanishes = dot(gradient, gradient) == 0;
+      if (!vanishes && !history.empty()) {
+        history.clear();
+        continue;
+      }
+      result.stop = vanishes ? MinimizerStop::converged : MinimizerStop::no_step;
+      result.explanation = vanishes ? "the gradient vanishes" : "there is no direction in which the energy decreases";
       return result;
     }
     // Weak Wolfe conditions by bisection, without the curvature condition once an upper end is known. +infinity fails

@@ -19,6 +19,8 @@ namespace {
 constexpr double kShortStep = 0.5;
 /// Steps after which everything but x is forgotten, so that an interrupted minimization can be resumed from x.
 constexpr int kRestartPeriod = 8;
+/// Slopes below this are rounding; dimensionless, like E.
+constexpr double kLevel = 1e-26;
 
 /// One minimization by Newton's method.
 class NewtonRun {
@@ -28,16 +30,19 @@ class NewtonRun {
 
  private:
   enum class Search {
-    found,    ///< a step was found
-    stiffer,  ///< no step: cells block it; they are stiffer now
-    no_step,  ///< no step is acceptable
-    level,    ///< no line search: the directional derivative is numerically zero
-    ended     ///< stopped by the caller
+    found,         ///< a step was found
+    stiffer,       ///< no step: cells block it; they are stiffer now
+    no_step,       ///< no step is acceptable
+    level,         ///< no line search: the gradient is numerically zero
+    no_direction,  ///< no line search: there is no direction in which the energy decreases, though it has a gradient
+    ended          ///< stopped by the caller
   };
 
   /// Finds a direction and a step along it. If the step would be short, makes the Hessian stiffer and tries again.
   Search find_step(IterationRecord& record);
   bool find_direction(IterationRecord& record);
+  /// Returns true if the gradient is zero up to rounding.
+  bool has_no_gradient() const;
   /// Finds the longest of t, t / 2, ... that decreases E and leaves no further cell uncertified. If cells were
   /// uncertified at a longer one, it is halved once more (`VolumeTerm::keeps_off_inversion`).
   Search search_line(bool may_stiffen, IterationRecord& record);
@@ -89,9 +94,17 @@ bool NewtonRun::find_direction(IterationRecord& record) {
   ReducedHessian reduced(problem_);
   if (inverse_diagonal_.empty()) inverse_diagonal_ = inverse_blocks(reduced.diagonal(), problem_.projectors);
   record.linear_iterations += conjugate_gradients(reduced, inverse_diagonal_, linearized_.gradient(), options_, d_);
-  constexpr double kLevel = 1e-26;  // dimensionless, like E; smaller slopes are rounding
   slope_ = dot(linearized_.gradient(), d_);
   return slope_ < -kLevel;
+}
+
+bool NewtonRun::has_no_gradient() const {
+  double decrease = 0;  // that the preconditioner foretells
+  for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
+    const Vec3& g = linearized_.gradient()[j];
+    decrease += inverse_diagonal_[j].isZero(0) ? g.squaredNorm() : g.dot(inverse_diagonal_[j] * g);
+  }
+  return decrease <= kLevel;
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
@@ -101,7 +114,7 @@ NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
   for (int round = 0;; ++round) {
     const bool downhill = find_direction(record);
     if (has_ended(options_, result_)) return Search::ended;
-    if (!downhill) return Search::level;
+    if (!downhill) return has_no_gradient() ? Search::level : Search::no_direction;
     problem_.nodes.apply(d_, dy_);
     t_ = problem_.volume->max_step(y_, dy_);
     // Points that limit the whole step this much had better stay where they are.
@@ -228,6 +241,8 @@ MinimizerResult NewtonRun::run() {
     const Search found = find_step(record);
     if (found == Search::ended) return std::move(result_);
     if (found == Search::level) return end(MinimizerStop::converged, "the gradient vanishes");
+    if (found == Search::no_direction)
+      return end(MinimizerStop::no_step, "the second derivatives give no direction in which the energy decreases");
     if (!blocking_.empty()) {
       is_refined = true;
       memory_.clear();  // the steps before lowered another E

@@ -62,6 +62,23 @@ void ReducedHessian::multiply(std::span<const Vec3> in, std::span<Vec3> out) {
   for (std::size_t j = 0; j < in.size(); ++j) out[j] += added_[j] * in[j];
 }
 
+namespace {
+
+bool is_positive_definite(const Mat3& block) {
+  return block(0, 0) > 0 && block.topLeftCorner<2, 2>().determinant() > 0 && block.determinant() > 0;
+}
+
+/// Returns the inverse of a block, or that of its trace times the identity if the block is not positive definite.
+Mat3 positive_inverse(const Mat3& block, double trace) {
+  if (is_positive_definite(block)) {
+    const Mat3 inverse = block.inverse();
+    if (inverse.allFinite()) return inverse;
+  }
+  return Mat3::Identity() / trace;
+}
+
+}  // namespace
+
 std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks, std::span<const Mat3> projectors) {
   std::vector<Mat3> inverse(blocks.size());
 #pragma omp parallel for schedule(static)
@@ -70,12 +87,12 @@ std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks, std::span<const M
     if (!(trace > 0)) {
       inverse[j].setZero();
     } else if (projectors.empty()) {
-      inverse[j] = blocks[j].inverse();
+      inverse[j] = positive_inverse(blocks[j], trace);
     } else {
       const Mat3& p = projectors[j];
       // Any positive value across the image serves: it is projected away again.
       const Mat3 block = p * blocks[j] * p + trace * (Mat3::Identity() - p);
-      inverse[j] = p * block.inverse() * p;
+      inverse[j] = p * positive_inverse(block, trace) * p;
     }
   }
   return inverse;

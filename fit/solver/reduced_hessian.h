@@ -44,7 +44,8 @@ class ReducedHessian {
   std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
 };
 
-/// Returns the inverse blocks, 0 for those with no positive trace: vertices of no cell do not move.
+/// Returns the inverse blocks, 0 for those with no positive trace: vertices of no cell do not move. Of a block that is
+/// not positive definite, the inverse is that of its trace times the identity.
 ///
 /// projectors  P, one per block: the inverse is that of the block on the image of P, and 0 across it, so that the
 ///             directions of `conjugate_gradients` stay in the images. Empty: the identity for all.

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/surface/corner_fans.h"
 #include "subvol/surface/crowded_edges.h"
+#include "subvol/surface/orientation.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/rim_loops.h"
 #include "subvol/surface/welded_surface.h"
@@ -24,11 +25,6 @@ namespace subvol {
 using namespace internal;
 
 namespace {
-
-struct Neighbor {
-  Index triangle = kNoIndex;
-  bool flipped = false;  ///< true if both triangles run the same way along their common edge
-};
 
 /// The sides of one or two triangles at an edge of the surface. Where solids touch along an edge, each has its own.
 struct SurfaceEdge {
@@ -57,13 +53,13 @@ std::vector<SurfaceEdge> edges_of(const TriangleMesh& mesh, std::span<const Inde
 }
 
 /// Returns the neighbors across the edges of each triangle, in no particular order. names: vertex numbers for messages.
-std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const Index> names) {
-  std::vector<std::vector<Neighbor>> neighbors(mesh.triangles.size());
+std::vector<std::vector<TriangleNeighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const Index> names) {
+  std::vector<std::vector<TriangleNeighbor>> neighbors(mesh.triangles.size());
   for (const auto& [first, second] : edges_of(mesh, names)) {
     if (!second) continue;
-    const bool flipped = first.forward == second->forward;
-    neighbors[first.triangle].push_back({second->triangle, flipped});
-    neighbors[second->triangle].push_back({first.triangle, flipped});
+    const bool disagrees = first.forward == second->forward;
+    neighbors[first.triangle].push_back({second->triangle, disagrees});
+    neighbors[second->triangle].push_back({first.triangle, disagrees});
   }
   return neighbors;
 }
@@ -71,41 +67,11 @@ std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::s
 /// Flips triangles to agree with their neighbors; the majority of a component stays as it is. Returns the component of
 /// each triangle, or -1 for a triangle without neighbors.
 std::vector<int> orient(TriangleMesh& mesh, std::span<const Index> names, SolidBoundary& result) {
-  const auto neighbors = neighbors_of(mesh, names);
-  std::vector<int> component(mesh.triangles.size(), -1);
-  std::vector<char> turned(mesh.triangles.size(), 0);
-  std::vector<Index> queue;
-  int count = 0;
-  for (std::size_t seed = 0; seed < mesh.triangles.size(); ++seed) {
-    if (component[seed] >= 0 || neighbors[seed].empty()) continue;
-    queue.assign(1, static_cast<Index>(seed));
-    component[seed] = count;
-    for (std::size_t q = 0; q < queue.size(); ++q) {
-      const auto t = static_cast<std::size_t>(queue[q]);
-      for (const Neighbor& n : neighbors[t]) {
-        const auto other = static_cast<std::size_t>(n.triangle);
-        const char wanted = static_cast<char>(turned[t] != static_cast<char>(n.flipped));
-        if (component[other] < 0) {
-          component[other] = count;
-          turned[other] = wanted;
-          queue.push_back(n.triangle);
-        } else if (turned[other] != wanted) {
-          throw InputError("surface: it cannot be oriented (around triangle " + std::to_string(other) + ")");
-        }
-      }
-    }
-    const auto num_turned = static_cast<std::size_t>(
-        std::count_if(queue.begin(), queue.end(), [&](Index t) { return turned[t] != 0; }));
-    const bool majority_turned = 2 * num_turned > queue.size();
-    for (Index t : queue)
-      if ((turned[t] != 0) != majority_turned) {
-        auto& corners = mesh.triangles[t];
-        std::swap(corners[1], corners[2]);
-        ++result.flipped_triangles;
-      }
-    ++count;
-  }
-  return component;
+  OrientedParts parts = orient_parts(mesh, neighbors_of(mesh, names));
+  if (parts.not_oriented != kNoIndex)
+    throw InputError("surface: it cannot be oriented (around triangle " + std::to_string(parts.not_oriented) + ")");
+  result.flipped_triangles += parts.turned;
+  return std::move(parts.part);
 }
 
 /// Drops the triangles that belong to no component.

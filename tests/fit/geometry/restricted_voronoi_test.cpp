@@ -336,4 +336,7 @@ TEST_CASE("what RestrictedVoronoi refuses") {
   const std::vector<Vec3> positions(3, Vec3(0, 0, 0));
   const std::vector<std::array<Index, 3>> triangles{{0, 1, 3}};
   CHECK_THROWS_AS(voronoi.compute(positions, triangles), InputError);
+  std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {nan, 1, 0}};
+  CHECK_THROWS_AS(voronoi.compute(square, std::vector<std::array<Index, 3>>{{0, 2, 3}}), InputError);
+  CHECK(voronoi.compute(square, std::vector<std::array<Index, 3>>{{0, 1, 2}}).size() == 1);
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/solver/newton.h"
+#include "subvol/base/error.h"
+#include "subvol/fit/solver/reduced_hessian.h"
 
 #include <catch2/catch.hpp>
 
+#include <limits>
 #include <memory>
 
 using namespace subvol;
@@ -59,7 +61,47 @@ struct StifferWall final : Wall {
   }
 };
 
+/// One whose second derivatives are given.
+struct BentWall final : Wall {
+  Mat3 hessian;
+  BentWall(std::vector<Vec3>& at, const Mat3& given) : Wall(at, true), hessian(given) {}
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override { out[0] = hessian * in[0]; }
+  void add_diagonal_blocks(const SparseMap&, const SparseMap&, std::span<Mat3> diagonal) const override {
+    diagonal[0] += hessian;
+  }
+};
+
 }  // namespace
+
+TEST_CASE("Only a gradient of zero counts as one that vanishes") {
+  std::vector<Vec3> densified_at;
+  const SparseMap identity{1, {0, 1}, {0}, {1}};
+  const auto minimized = [&](const Mat3& hessian, Vec3 start) {
+    FitProblem problem(identity, select_rows(identity, {}), std::make_unique<BentWall>(densified_at, hessian), nullptr,
+                       1);
+    std::vector<Vec3> x = {start};
+    return minimize_newton(problem, x, {.max_iterations = 1});
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Vec3 start = Vec3::Zero(), end(1.5, 0, 0);
+  for (const Vec3& diagonal : {Vec3(-1, 3, 3), Vec3(-1, -1, -1), Vec3(nan, 1, 1)}) {
+    const MinimizerResult result = minimized(diagonal.asDiagonal(), start);
+    CHECK(result.stop == MinimizerStop::no_step);
+    CHECK_THAT(result.explanation, Catch::Contains("no direction"));
+    CHECK(minimized(diagonal.asDiagonal(), end).stop == MinimizerStop::converged);
+  }
+  CHECK(minimized(2 * Mat3::Identity(), start).iterations.size() == 1);
+}
+
+TEST_CASE("Blocks that are not positive definite have positive inverses all the same") {
+  const Vec3 indefinite(-1, 3, 3), singular(2, 0, 0), definite(1, 2, 4);
+  const std::vector<Mat3> blocks{Mat3(indefinite.asDiagonal()), Mat3(singular.asDiagonal()),
+                                 Mat3(definite.asDiagonal())};
+  const std::vector<Mat3> inverse = inverse_blocks(blocks);
+  CHECK(inverse[0] == Mat3(Mat3::Identity() / 5));
+  CHECK(inverse[1] == Mat3(Mat3::Identity() / 2));
+  CHECK(inverse[2] == Mat3(Vec3(1, 0.5, 0.25).asDiagonal()));
+}
 
 TEST_CASE("A cell in the way of a step is made stiffer, until it is not") {
   std::vector<Vec3> densified_at;
