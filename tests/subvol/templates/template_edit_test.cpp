@@ -53,6 +53,7 @@ TEST_CASE("A grid fills its box by counts and by size", "[templates]") {
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {1, 0, 1}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {100000, 100000, 100000}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 0.0), InputError);
+  CHECK_THROWS_AS(box_grid(Vec3::Constant(-1.5e308), Vec3::Constant(1.5e308), {1, 1, 1}), InputError);
 }
 
 TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[templates]") {
@@ -81,6 +82,8 @@ TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[t
   CHECK_THROWS_AS(carve(lattice, [](std::size_t) { return false; }), InputError);
   CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 4; }), InputError);   // along an edge
   CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 13; }), InputError);  // at a vertex
+  // Numbers are those of the whole lattice: cells 13 and 26 share its vertex (2, 2, 2) of 4 x 4 x 4.
+  CHECK_THROWS_WITH(carve(lattice, [](std::size_t c) { return c == 13 || c == 26; }), Catch::Contains("vertex 42"));
   CHECK_THROWS_AS(cells_listed(lattice, std::array<Index, 1>{27}), InputError);
   CHECK_THROWS_AS(cells_inside(lattice, ball, 0), InputError);
 }
