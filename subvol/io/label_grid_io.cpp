@@ -85,14 +85,13 @@ void take_counts(LabelGrid& grid, std::span<const double> sizes, const FileText&
   std::size_t dimensions = sizes.size();
   while (dimensions > 3 && sizes[dimensions - 1] == 1) --dimensions;
   if (dimensions != 3) file.fail("it has " + std::to_string(dimensions) + " dimensions, expected 3");
-  double product = 1;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(sizes[a] >= 1 && sizes[a] <= std::numeric_limits<int>::max()) || sizes[a] != std::floor(sizes[a]))
       file.fail("an axis has " + std::to_string(sizes[a]) + " voxels, expected 1 or more");
-    product *= sizes[a];
     grid.counts[a] = static_cast<int>(sizes[a]);
   }
-  if (!(product <= std::numeric_limits<int>::max())) file.fail("it has more than 2^31 - 1 voxels");
+  if (!can_number_voxels(grid.counts))
+    file.fail("it has more than 2^31 - 1 voxels, those of the empty layers around it included");
 }
 
 void require_sound_axes(const LabelGrid& grid, const FileText& file) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace subvol {
@@ -19,5 +20,19 @@ struct LabelGrid {
 
   std::size_t num_voxels() const { return labels.size(); }
 };
+
+namespace internal {
+
+/// Layers of empty voxels that are put around a segmentation.
+inline constexpr int kLabelRim = 2;
+
+/// Returns true if the corners of all voxels and of those layers can be numbered with 32 bits.
+inline bool can_number_voxels(const std::array<int, 3>& counts) {
+  double corners = 1;
+  for (const int n : counts) corners *= n + (2 * kLabelRim + 1.0);
+  return corners <= std::numeric_limits<Index>::max();
+}
+
+}  // namespace internal
 
 }  // namespace subvol

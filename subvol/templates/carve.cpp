@@ -56,6 +56,17 @@ void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& poi
       }
 }
 
+/// Returns the first message about a kind of defect of the kept cells, with the mesh's own numbers of vertices.
+std::string message_of(MeshDefect::Kind kind, const VolumeMesh& mesh, std::span<const char> kept) {
+  VolumeMesh part;
+  part.positions = mesh.positions;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (kept[c]) part.add_cell(mesh.kinds[c], mesh.cell(c));
+  const std::vector<MeshDefect> defects = validate(part);
+  const auto found = std::ranges::find(defects, kind, &MeshDefect::kind);
+  return found == defects.end() ? std::string() : found->message;
+}
+
 }  // namespace
 
 VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t cell)>& keep) {
@@ -65,7 +76,7 @@ VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t ce
   VolumeMesh result = kept_cells(mesh, kept);
   for (const MeshDefect& defect : validate(result))
     if (defect.kind == MeshDefect::Kind::nonmanifold_edge || defect.kind == MeshDefect::Kind::nonmanifold_vertex)
-      throw InputError("carve: what is kept touches itself: " + defect.message);
+      throw InputError("carve: what is kept touches itself: " + message_of(defect.kind, mesh, kept));
   return result;
 }
 

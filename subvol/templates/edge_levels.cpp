@@ -97,17 +97,50 @@ struct SharpEdges {
   std::vector<std::vector<Index>> neighbors;  ///< of each vertex, along sharp edges
 };
 
+/// Returns a vector along the normal of each triangle. One without area has that of the triangle across its longest
+/// edge, as if it were cut off there, or zero if there is none.
+/// sides  those of the mesh, sorted.
+std::vector<Vec3> normals_across_slivers(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
+  constexpr double kFlat = 1e-12;  // of the square of the longest edge
+  constexpr int kMostSteps = 8;    // from sliver to sliver
+  std::vector<Vec3> normals;
+  std::vector<double> longest(mesh.triangles.size(), 0.0);  // squared; 0 for triangles with an area
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
+    normals.push_back(doubled_area_vector(mesh, mesh.triangles[t]));
+    const double length = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+    if (normals[t].norm() <= kFlat * length) longest[t] = length;
+  }
+  if (std::ranges::all_of(longest, [](double length) { return length == 0; })) return normals;
+  std::vector<Index> across(mesh.triangles.size(), kNoIndex);
+  for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
+    if (edge.size() != 2) return;
+    const double length = (mesh.positions[edge[0].high] - mesh.positions[edge[0].low]).squaredNorm();
+    for (const std::size_t i : {0u, 1u})
+      if (longest[edge[i].triangle] == length) across[edge[i].triangle] = edge[1 - i].triangle;
+  });
+  for (std::size_t t = 0; t < normals.size(); ++t) {
+    if (longest[t] == 0) continue;
+    auto at = static_cast<Index>(t);
+    for (int step = 0; step < kMostSteps && at != kNoIndex && longest[at] > 0; ++step) at = across[at];
+    normals[t] = at == kNoIndex || longest[at] > 0 ? Vec3::Zero() : normals[at];
+  }
+  return normals;
+}
+
 SharpEdges sharp_edges(const TriangleMesh& surface, const Mat3& frame) {
   constexpr double kSharpCosine = 0.766;  // 40 degrees
   const TriangleMesh mesh = welded(surface).mesh;
   SharpEdges sharp;
   for (const Vec3& p : mesh.positions) sharp.positions.push_back(frame.transpose() * p);
   sharp.neighbors.resize(mesh.positions.size());
-  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
+  const std::vector<SurfaceHalfEdge> all_sides = sorted_half_edges(mesh.triangles, mesh.positions.size());
+  const std::vector<Vec3> normals = normals_across_slivers(mesh, all_sides);
+  for_each_edge(all_sides, [&](std::span<const SurfaceHalfEdge> sides) {
     if (sides.size() != 2) return;
-    const Vec3 a = doubled_area_vector(mesh, mesh.triangles[sides[0].triangle]);
-    const Vec3 b = doubled_area_vector(mesh, mesh.triangles[sides[1].triangle]);
-    if (a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
+    const Vec3 &a = normals[sides[0].triangle], &b = normals[sides[1].triangle];
+    if (a.isZero(0) || b.isZero(0) || a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
     sharp.edges.push_back({sides[0].low, sides[0].high});
     sharp.neighbors[sides[0].low].push_back(sides[0].high);
     sharp.neighbors[sides[0].high].push_back(sides[0].low);

@@ -23,7 +23,7 @@ using namespace internal;
 
 namespace {
 
-constexpr int kRim = 2;  ///< layers of empty voxels around the grid
+constexpr int kRim = kLabelRim;
 
 /// A face between two voxels, its normal pointing from `pair[0]` to `pair[1]`; labels are places in the list of
 /// regions, 0: outside.
@@ -41,6 +41,8 @@ class LabelSheets {
     if (nx < 1 || ny < 1 || nz < 1 || static_cast<double>(nx) * ny * nz != static_cast<double>(grid.labels.size()))
       throw InputError(formatted("segmentation: it has %zu labels, expected those of %d x %d x %d voxels",
                                  grid.labels.size(), nx, ny, nz));
+    if (!can_number_voxels(grid.counts))
+      throw InputError("segmentation: it has more than 2^31 - 1 voxels, those of the empty layers around it included");
     values_ = grid.labels;
     std::sort(values_.begin(), values_.end());
     values_.erase(std::unique(values_.begin(), values_.end()), values_.end());

@@ -2,6 +2,7 @@
 #include "subvol/templates/pillow.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/templates/template_edit.h"
@@ -14,6 +15,7 @@
 #include <map>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -75,10 +77,12 @@ std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const SetFace
   return number;
 }
 
-void require_manifold(std::span<const SetFace> faces, std::span<const Index> number, std::size_t num_vertices) {
+/// origins  numbers of the old vertices for the message.
+void require_manifold(std::span<const SetFace> faces, std::span<const Index> number, std::span<const Index> origins) {
   std::vector<Index> names, offsets{0}, corners;
+  const std::size_t num_vertices = number.size();
   for (std::size_t v = 0; v < num_vertices; ++v)
-    if (number[v] != kNoIndex) names.push_back(static_cast<Index>(v));
+    if (number[v] != kNoIndex) names.push_back(origins[v]);
   for (const SetFace& face : faces) {
     for (Index v : face.vertices()) corners.push_back(number[v] - static_cast<Index>(num_vertices));
     offsets.push_back(static_cast<Index>(corners.size()));
@@ -123,7 +127,9 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
 }
 
 /// Halves the steps of the vertices of inverted cells until no cell is inverted.
-void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps) {
+/// origins  numbers of all vertices for the message.
+void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps,
+                   std::span<const Index> origins) {
   constexpr int kRounds = 20;
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < number.size(); ++v)
@@ -147,7 +153,7 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
     if (!corners_positive(mesh, c))
       throw InputError("pillow: no direction keeps all cells valid around vertex " +
-                       std::to_string(old[mesh.cell(c)[0]] == kNoIndex ? mesh.cell(c)[0] : old[mesh.cell(c)[0]]));
+                       std::to_string(origins[mesh.cell(c)[0]]));
 }
 
 /// Returns the faces of those connected parts of a boundary that are wanted.
@@ -176,10 +182,106 @@ std::vector<SetFace> chosen_parts(std::span<const SetFace> faces, std::size_t nu
   return chosen;
 }
 
+using EdgeKey = std::array<Index, 2>;
+EdgeKey edge_key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
+
+template <class Key>
+void sort_keys(std::vector<Key>& keys) {
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+}
+
+template <class Key>
+bool has_key(const std::vector<Key>& sorted, const Key& key) {
+  return std::binary_search(sorted.begin(), sorted.end(), key);
+}
+
+/// Keys of the faces that get a layer and of their edges, sorted.
+struct LayerKeys {
+  std::vector<FaceKey> faces;
+  std::vector<EdgeKey> edges;
+
+  explicit LayerKeys(std::span<const SetFace> layer) {
+    for (const SetFace& face : layer) {
+      faces.push_back(face_key(face.vertices()));
+      for (std::size_t i = 0; i < face.size; ++i)
+        edges.push_back(edge_key(face.corners[i], face.corners[(i + 1) % face.size]));
+    }
+    sort_keys(faces);
+    sort_keys(edges);
+  }
+};
+
+/// Moves the groups of faces inside a set to the set's new vertices. If such a face ends at the layer, the side faces
+/// of the layer's cells go on from its edge to the old one, and are in the group as well.
+void carry_inner_groups(const VolumeMesh& mesh, std::span<const char> in_set, const LayerKeys& layer,
+                        std::span<const Index> number, VolumeFaceGroups& groups) {
+  std::map<FaceKey, std::vector<Index>> inner;  // corners of the set's faces without a layer
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (!in_set[c]) continue;
+    const CellTopology& local = cell_topology(mesh.kinds[c]);
+    for (int f = 0; f < local.num_faces; ++f) {
+      std::vector<Index> corners;
+      for (int i = 0; i < local.face_sizes[f]; ++i) corners.push_back(mesh.cell(c)[local.faces[f][i]]);
+      const bool moves = std::ranges::any_of(corners, [&](Index v) { return number[v] != kNoIndex; });
+      if (const FaceKey key = face_key(corners); moves && !has_key(layer.faces, key)) inner[key] = std::move(corners);
+    }
+  }
+  const std::size_t given = groups.faces.size();
+  for (std::size_t i = 0; i < given; ++i) {
+    const auto found = inner.find(groups.faces[i].face);
+    if (found == inner.end()) continue;
+    const Index group = groups.faces[i].group;
+    std::vector<Index> moved = found->second;
+    for (Index& v : moved)
+      if (number[v] != kNoIndex) v = number[v];
+    groups.faces[i].face = face_key(moved);
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const Index a = found->second[k], b = found->second[(k + 1) % moved.size()];
+      if (has_key(layer.edges, edge_key(a, b)))
+        groups.faces.push_back({face_key(std::array{a, b, number[b], number[a]}), group});
+    }
+  }
+  normalize(groups);
+}
+
+/// Moves the creases inside a set to the set's new vertices. A crease that ends at the layer goes on through it.
+void carry_inner_creases(const VolumeMesh& mesh, std::span<const char> in_set, const LayerKeys& layer,
+                         std::span<const Index> number, VolumeMesh& result) {
+  std::vector<EdgeKey> edges;  // of the set's cells
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (!in_set[c]) continue;
+    const CellTopology& local = cell_topology(mesh.kinds[c]);
+    for (int e = 0; e < local.num_edges; ++e)
+      edges.push_back(edge_key(mesh.cell(c)[local.edges[e][0]], mesh.cell(c)[local.edges[e][1]]));
+  }
+  sort_keys(edges);
+  bool changed = false;
+  std::vector<CreaseEdge> through;
+  for (CreaseEdge& crease : result.tags.creases) {
+    const EdgeKey key = edge_key(crease.v0, crease.v1);
+    if (has_key(layer.edges, key) || !has_key(edges, key)) continue;
+    for (Index* const v : {&crease.v0, &crease.v1}) {
+      if (number[*v] == kNoIndex) continue;
+      through.push_back({*v, number[*v], crease.sharpness});
+      *v = number[*v];
+      changed = true;
+    }
+  }
+  if (!changed) return;
+  result.tags.creases.insert(result.tags.creases.end(), through.begin(), through.end());
+  normalize_tags(result.tags);
+  drop_lost_tags(result);
+}
+
 /// Puts a layer inside some faces of the boundary of a set.
-VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set) {
+/// origins  number in the caller's input of each vertex; those of the new ones are appended.
+VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set,
+                    std::vector<Index>& origins) {
   const std::vector<Index> number = new_numbers(mesh.num_vertices(), faces);
-  require_manifold(faces, number, mesh.num_vertices());
+  require_manifold(faces, number, origins);
+  for (std::size_t v = 0; v < number.size(); ++v)
+    if (number[v] != kNoIndex) origins.push_back(origins[v]);
   const std::vector<Vec3> steps = steps_inward(mesh, faces, in_set);
 
   VolumeMesh result = mesh;
@@ -196,8 +298,17 @@ VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std:
     result.add_cell(face.size == 4 ? CellKind::hex : CellKind::prism, corners);
     if (!mesh.references.empty()) result.references.push_back(mesh.references[face.cell]);
   }
-  shorten_steps(result, number, steps);
+  shorten_steps(result, number, steps, origins);
+  const LayerKeys layer(faces);
+  if (!mesh.face_groups.empty()) carry_inner_groups(mesh, in_set, layer, number, result.face_groups);
+  if (!mesh.tags.creases.empty()) carry_inner_creases(mesh, in_set, layer, number, result);
   return result;
+}
+
+std::vector<Index> own_numbers(const VolumeMesh& mesh) {
+  std::vector<Index> numbers(mesh.num_vertices());
+  std::iota(numbers.begin(), numbers.end(), Index{0});
+  return numbers;
 }
 
 }  // namespace
@@ -205,19 +316,21 @@ VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std:
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
   require_sound(mesh, "pillow");
   const std::vector<char> in_set = marked(mesh, cells);
-  return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set);
+  std::vector<Index> origins = own_numbers(mesh);
+  return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set, origins);
 }
 
 VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
   require_sound(mesh, "pillow");
   VolumeMesh result = mesh;
+  std::vector<Index> origins = own_numbers(mesh);
   for (const int reference : region_references(mesh)) {
     std::vector<char> in_set;
     for (std::size_t c = 0; c < result.num_cells(); ++c)
       in_set.push_back(mesh.references.empty() || result.references[c] == reference);
     std::vector<SetFace> faces = boundary_of_set(result, MeshTopology(result), in_set);
     if (takes) faces = chosen_parts(faces, result.num_vertices(), reference, takes);
-    if (!faces.empty()) result = pillowed(result, faces, in_set);
+    if (!faces.empty()) result = pillowed(result, faces, in_set, origins);
   }
   return result;
 }

@@ -21,8 +21,10 @@ namespace subvol {
 /// mesh    passes `validate` except for unused vertices.
 /// cells   numbers of the cells of the set, each once; empty: all cells.
 /// returns the old cells, those of the set on new vertices, then one cell per face of the set's boundary, ordered by
-/// cell and local face. Old vertices keep their numbers and positions, and so do tags, which lie on the old boundary;
-/// new vertices are appended. A new cell gets the reference of its neighbor in the set.
+/// cell and local face. Old vertices keep their numbers and positions; new vertices are appended. A new cell gets the
+/// reference of its neighbor in the set. Tags and groups of faces stay on the set's boundary and outside it, and move
+/// inward with the rest of the set: where a crease or a group inside the set ends at the layer, the edges or side faces
+/// of the new cells continue it up to the old boundary.
 ///
 /// A new vertex moves inward by 0.15 of the shortest edge that its old vertex has in the set, times the sum of the
 /// distinct unit normals there; less if a cell would be inverted. In a mesh of cubes or boxes from a grid no cell can

@@ -4,7 +4,6 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
-#include "subvol/mesh/pyramids.h"
 #include "subvol/templates/template_edit.h"
 
 #include <Eigen/Geometry>
@@ -365,7 +364,6 @@ void cut_creases(const FeatureTags& tags, const PlaceNumbers& numbers, FeatureTa
 LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped) {
   if (marked.size() != mesh.num_vertices())
     throw InputError("refine: marked must have one entry per vertex, " + std::to_string(mesh.num_vertices()));
-  require_no_pyramids(mesh.kinds, "refine: pyramids do not split into hexes, because four edges meet at their apex");
   std::vector<char> marks(marked.begin(), marked.end());
   grow_marks(mesh, marks);
 

@@ -17,8 +17,9 @@ namespace subvol {
 namespace {
 
 void check_box(const Vec3& low, const Vec3& high) {
-  if (!low.allFinite() || !high.allFinite() || !(low.array() < high.array()).all())
-    throw InputError("grid: the box must be finite, and its high corner above its low one along every axis");
+  if (!low.allFinite() || !high.allFinite() || !(high - low).allFinite() || !(low.array() < high.array()).all())
+    throw InputError(
+        "grid: the box and its sizes must be finite, and its high corner above its low one along every axis");
 }
 
 /// Throws if a grid with so many lines has more cells than can be numbered.

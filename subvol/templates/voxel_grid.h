@@ -46,7 +46,8 @@ struct VoxelGrid {
 };
 
 /// Returns the box from `low` to `high`, cut into the given number of cells along each axis.
-/// InputError: counts < 1, more cells than can be numbered, a corner that is not finite, or high <= low along an axis.
+/// InputError: counts < 1, more cells than can be numbered, a corner or difference of corners that is not finite,
+/// or high <= low along an axis.
 VoxelGrid box_grid(const Vec3& low, const Vec3& high, const std::array<int, 3>& counts);
 
 /// Returns the box from `low` to `high` with cells of about the given size: each axis is cut into equal parts, their

@@ -113,6 +113,7 @@ TEST_CASE("Damaged segmentations are refused with the cause", "[io]") {
   refused("a.npy", npy("|u1", false, "2, 3, 5", counted()), "24 bytes of data, expected 30");
   refused("a.npy", npy("|u1", false, "2, 12", counted()), "2 dimensions");
   refused("a.npy", npy("|u1", false, "99999, 99999, 99999", counted()), "2^31");
+  refused("a.npy", npy("|u1", false, "1, 1, 90000000", counted()), "2^31");
   refused("a.npy", npy("<c8", false, "2, 3, 4", counted()), "of type");
   refused("a.npy", npy("|i1", false, "1, 1, 1", "\xff"), "expected labels");
   refused("a.nrrd", "NRRD0004\ntype: uchar\n", "ends within its header");

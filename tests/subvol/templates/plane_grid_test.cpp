@@ -364,3 +364,25 @@ TEST_CASE("Scores weigh cells by their volumes", "[templates]") {
   CHECK(voxel_score(solid, fractions) == Approx(0.5 + 0.5 + 0.15));
   CHECK(voxel_score(solid, fractions, volumes) == Approx(0.2 + 0.2 + 0.15));
 }
+
+TEST_CASE("Triangles without area make no levels, and hide none", "[templates]") {
+  const TriangleMesh box = test::cube_surface(2, false);
+  TriangleMesh cut = box;
+  for (std::size_t t = 0; t < box.triangles.size(); t += 5) {  // a vertex in the middle of an edge, on one side only
+    const auto [a, b, c] = box.triangles[t];
+    const auto m = static_cast<Index>(cut.positions.size());
+    cut.positions.push_back((box.positions[a] + box.positions[b]) / 2);
+    cut.triangles[t] = {a, m, c};
+    cut.triangles.push_back({m, b, c});
+    cut.triangles.push_back({a, b, m});  // no area
+  }
+  const Mat3 turned = Eigen::AngleAxisd(0.5, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  for (const Mat3& frame : {Mat3(Mat3::Identity()), turned}) {
+    const auto expected = edge_levels(box, frame, 1e-6), found = edge_levels(cut, frame, 1e-6);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      REQUIRE(found[axis].size() == expected[axis].size());
+      for (std::size_t i = 0; i < found[axis].size(); ++i)
+        CHECK(found[axis][i].position == Approx(expected[axis][i].position).margin(1e-9));
+    }
+  }
+}

@@ -103,3 +103,22 @@ TEST_CASE("Thin cells are those between two sides", "[refine]") {
   CHECK(std::count(thin.begin(), thin.end(), 1) == 16);
   CHECK(std::count(thick.begin(), thick.end(), 1) == 0);
 }
+
+TEST_CASE("Hexes are refined beside pyramids, and marks on a pyramid are refused", "[templates]") {
+  VolumeMesh mesh = test::lattice(2, 2, 2);
+  const auto apex = static_cast<Index>(mesh.num_vertices());
+  mesh.positions.push_back(Vec3::Zero());
+  // On the face of the last cell that lies opposite to its first corner along its last axis.
+  const std::vector<Index> cell(mesh.cell(mesh.num_cells() - 1).begin(), mesh.cell(mesh.num_cells() - 1).end());
+  for (std::size_t i = 4; i < 8; ++i) mesh.positions.back() += mesh.positions[cell[i]] / 4;
+  mesh.positions.back() += mesh.positions[cell[4]] - mesh.positions[cell[0]];
+  mesh.add_cell(CellKind::pyramid, std::array<Index, 5>{cell[4], cell[5], cell[6], cell[7], apex});
+  REQUIRE(validate(mesh).empty());
+  std::vector<char> marked(mesh.num_vertices(), 0);
+  marked[mesh.cell(0)[0]] = 1;
+  const VolumeMesh refined = refine_at(mesh, marked);
+  CHECK(validate(refined).empty());
+  CHECK(refined.num_cells() == 7 + 4 + 1);
+  marked[apex] = 1;
+  CHECK_THROWS_WITH(refine_at(mesh, marked), Catch::Contains("is no hex"));
+}

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/template_edit.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -52,6 +53,7 @@ TEST_CASE("A grid fills its box by counts and by size", "[templates]") {
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {1, 0, 1}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {100000, 100000, 100000}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 0.0), InputError);
+  CHECK_THROWS_AS(box_grid(Vec3::Constant(-1.5e308), Vec3::Constant(1.5e308), {1, 1, 1}), InputError);
 }
 
 TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[templates]") {
@@ -80,6 +82,8 @@ TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[t
   CHECK_THROWS_AS(carve(lattice, [](std::size_t) { return false; }), InputError);
   CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 4; }), InputError);   // along an edge
   CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 13; }), InputError);  // at a vertex
+  // Numbers are those of the whole lattice: cells 13 and 26 share its vertex (2, 2, 2) of 4 x 4 x 4.
+  CHECK_THROWS_WITH(carve(lattice, [](std::size_t c) { return c == 13 || c == 26; }), Catch::Contains("vertex 42"));
   CHECK_THROWS_AS(cells_listed(lattice, std::array<Index, 1>{27}), InputError);
   CHECK_THROWS_AS(cells_inside(lattice, ball, 0), InputError);
 }
@@ -284,4 +288,53 @@ TEST_CASE("Extruding stacks hexes on quads and prisms on triangles", "[templates
   CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .layers = 0}), InputError);
   CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .direction = Vec3(0, 0, -1)}), InputError);
   CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .direction = Vec3(0, 0, 0)}), InputError);
+}
+
+TEST_CASE("Layers carry groups of inner faces and creases of interfaces up to the old boundary", "[templates]") {
+  VolumeMesh mesh = voxel_mesh(box_grid(Vec3::Zero(), Vec3::Constant(4), {4, 4, 4}));
+  const auto vertex_at = [&](double x, double y, double z) {
+    for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+      if (mesh.positions[v] == Vec3(x, y, z)) return static_cast<Index>(v);
+    return kNoIndex;
+  };
+  mesh.face_groups.groups = {{"middle", 1, 2}, {"floor", 2, 2}};
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const auto corners = mesh.cell(c);
+    const Vec3& low = mesh.positions[corners[0]];
+    mesh.references.push_back(low.z() < 2 ? 1 : low.x() < 2 ? 2 : 3);  // three sheets meet in a line
+    const FaceKey bottom = face_key(std::array{corners[0], corners[1], corners[2], corners[3]});
+    if (low.z() == 2) mesh.face_groups.faces.push_back({bottom, 0});
+    if (low.z() == 0) mesh.face_groups.faces.push_back({bottom, 1});
+  }
+  normalize(mesh.face_groups);
+  for (int i = 0; i < 4; ++i) mesh.tags.creases.push_back({vertex_at(i, 1, 2), vertex_at(i + 1, 1, 2), 2.0});
+  mesh.tags.creases.push_back({vertex_at(0, 0, 0), vertex_at(1, 0, 0), 1.0});
+  mesh.tags.corners.push_back({vertex_at(2, 2, 2), 3.0});
+  normalize_tags(mesh.tags);
+  REQUIRE(validate(mesh).empty());
+  std::vector<Index> half, core;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const Vec3& low = mesh.positions[mesh.cell(c)[0]];
+    if (low.x() < 2) half.push_back(static_cast<Index>(c));
+    if (low.minCoeff() >= 1 && low.maxCoeff() <= 2) core.push_back(static_cast<Index>(c));
+  }
+  for (const VolumeMesh& made : {pillow(mesh), pillow(mesh, half), pillow(mesh, core), pillow_regions(mesh)}) {
+    CHECK(validate(made).empty());
+    const MeshTopology topology(made);
+    std::array<double, 2> area{};
+    for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+      const auto face = topology.face(static_cast<Index>(f));
+      const Index group = group_of(made.face_groups, face);
+      if (group == kNoIndex) continue;
+      const auto p = [&](std::size_t i) { return made.positions[face[i]]; };
+      area[static_cast<std::size_t>(group)] += 0.5 * (p(2) - p(0)).cross(p(3) - p(1)).norm();
+    }
+    CHECK(area[0] == Approx(16));
+    CHECK(area[1] == Approx(16));
+    double length = 0;
+    for (const CreaseEdge& crease : made.tags.creases)
+      if (crease.sharpness == 2.0) length += (made.positions[crease.v0] - made.positions[crease.v1]).norm();
+    CHECK(length == Approx(4).epsilon(0.02));
+    CHECK(made.tags.corners.size() == 1);
+  }
 }
