@@ -6,6 +6,7 @@
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
+#include <cctype>
 #include <optional>
 #include <set>
 
@@ -93,6 +94,12 @@ std::string shared_faces_lost(const Output& output, std::span<const SharedGroup>
          list + "; take .msh, .vtu, .inp or .e";
 }
 
+/// Returns true if a file has a name, but for blanks and marks in it: "left side" may be left_side.
+bool is_spelled_alike(const std::string& name, const std::string& in_file) {
+  return std::equal(name.begin(), name.end(), in_file.begin(), in_file.end(),
+                    [](unsigned char c, unsigned char d) { return c == d || (c < 128 && std::isalnum(c) == 0); });
+}
+
 /// Returns what an output loses of names, in words; empty if nothing.
 std::string names_lost(const Output& output, std::span<const Group> named) {
   if (output.part == Part::boundary || output.part == Part::cutaway || output.part == Part::region || output.is_page())
@@ -105,7 +112,7 @@ std::string names_lost(const Output& output, std::span<const Group> named) {
     if (held == Held::numbers && ++num_lost == 1) first_lost = quoted_label(label_of(group));
     if (held != Held::names) continue;
     const std::string name = internal::name_in_file(output.extension, group.name);
-    if (name != group.name && ++num_altered == 1)
+    if (!is_spelled_alike(group.name, name) && ++num_altered == 1)
       first_altered = quoted_label(label_of(group)) + (name.empty() ? " to its number" : " to " + quoted_label(name));
   }
   const auto names = [](std::size_t n) { return n == 1 ? std::string("1 name") : std::to_string(n) + " names"; };

@@ -79,7 +79,7 @@ TEST_CASE("Names that a format leaves out or alters are told once for each outpu
   for (const char* file : {"a.vtk", "a.bdf"}) CHECK(has(only(file, marks), "1 name left out, the first \"steel\""));
   CHECK(has(only("a.inp", marks), "1 name altered"));
   CHECK(has(only("a.inp", marks), "\"gro\xc3\x9f es Dach\" to \"gro___es_Dach\""));
-  CHECK(has(only("a.obj", marks), "to \"gro\xc3\x9f_es_Dach\""));
+  CHECK(told_of_losses(marks, "a.obj").empty());  // only its blanks change
   for (const char* file : {"a.mesh", "a.msh", "a.vtu", "a.e", "a.glb", "a.usda", "a.3mf"}) {
     CAPTURE(file);
     CHECK(told_of_losses(marks, file).empty());
