@@ -106,7 +106,7 @@ class MeshOptimizer : OptimizeDriver {
   bool steps_ran_out() const;
   void finish(bool going);
 
-  /// What an attempt has reached.
+  /// Holds the state that an attempt reached.
   struct Outcome {
     std::vector<Vec3> positions;
     std::size_t num_uncertified;

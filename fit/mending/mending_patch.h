@@ -27,7 +27,7 @@ struct MendingChange {
   double distance = 0;           ///< by which the surface changes, at most
 };
 
-/// What a change of a patch has replaced.
+/// Holds what a change of a patch replaced, so that it can be undone.
 struct PatchUndo {
   std::vector<std::pair<Index, std::array<Index, 3>>> triangles;  ///< numbers, and corners before
   Index moved = kNoIndex;                                         ///< a vertex that moved, if any
@@ -64,7 +64,7 @@ struct MendingPatch {
 std::vector<MendingChange> possible_changes(const MendingPatch& patch, const std::vector<Index>& vertices,
                                             std::span<const Vec3> given, double distance);
 
-/// What is wrong with a patch.
+/// Lists the faults of a patch.
 struct PatchFaults {
   std::vector<std::array<Index, 2>> meeting;  ///< pairs of triangles that meet improperly
   std::vector<Index> flat;                    ///< triangles without area
@@ -87,7 +87,7 @@ struct PatchRating {
 /// Returns what is wrong with a patch. Cost: that of `self_intersections`.
 PatchFaults faults_of(const MendingPatch& patch);
 
-/// What a change makes of the faults of a patch. Only the triangles that it touches are looked at.
+/// Finds the faults of a patch after a change. It looks only at the triangles that the change touches.
 class FaultsAfter {
  public:
   /// patch  after the change.  replaced: by the change.  known: the faults before it. All must outlive this.

@@ -174,7 +174,7 @@ VoxelLabels LabelSheets::cleaned() {
                        " has only specks of fewer than " + std::to_string(options_.least_voxels) + " voxels");
   std::vector<char> changes(labels.num_cells(), 0);
   for (int round = 0; round < kRounds; ++round) {
-    // What stays bad is an edge of four faces, which does no harm.
+    // An edge of four faces may stay. It does no harm.
     make_points_good(labels, share, changes, &stop_);
     if (stop_.is_stopped()) break;
     const std::size_t dropped = drop_specks(labels, true);

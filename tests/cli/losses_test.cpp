@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What outputs lose of a mesh's groups and names, and what is said about it.
+// Warnings say which groups and names of a mesh an output loses.
 
 #include "cli/runs/losses.h"
 #include "tests/support/grouped_meshes.h"
