@@ -58,8 +58,8 @@ double mended_volume(std::span<const Vec3> positions, std::span<const std::array
   }
 }
 
-/// Returns true if all closed parts of more than a volume face the way that their nesting asks for. The volumes of
-/// parts that do not would be taken off the sum instead of added, or the other way around.
+/// Returns true if all closed parts with more than a given volume face the way that their nesting asks for. The volumes
+/// of parts that do not would be taken off the sum instead of added, or the other way around.
 bool parts_agree(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double least) {
   const SurfaceParts parts =
       surface_parts({{positions.begin(), positions.end()}, {triangles.begin(), triangles.end()}});
