@@ -76,7 +76,7 @@ ParsedSurface parse_scene(const std::string& name, std::string_view bytes) {
   FaceLabels labels;
   for (unsigned m = 0; m < scene->mNumMeshes; ++m)
     add_mesh(name, *scene, *scene->mMeshes[m], welder, parsed.mesh, labels);
-  parsed.mesh.positions = welder.take();
+  parsed.mesh.positions = welder.take(parsed.mesh.face_vertices);
   parsed.mesh.face_groups = labels.groups();
   return parsed;
 }

@@ -9,7 +9,8 @@
 
 namespace subvol::internal {
 
-/// Makes a mesh of triangles whose corners come one after the other. Equal positions become one vertex.
+/// Makes a mesh of triangles whose corners come one after the other. Equal positions become one vertex
+/// (PositionWelder).
 class TriangleWelder {
  public:
   /// Adds a corner; three make a triangle.
@@ -24,7 +25,7 @@ class TriangleWelder {
   void drop_groups() { mesh_.face_groups = {}; }
   bool is_empty() const { return mesh_.face_vertices.empty(); }
   PolygonMesh take() {
-    mesh_.positions = welder_.take();
+    mesh_.positions = welder_.take(mesh_.face_vertices);
     return std::move(mesh_);
   }
 

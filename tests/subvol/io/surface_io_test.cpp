@@ -145,6 +145,21 @@ TEST_CASE("STL is read as text and binary, also when a binary file begins with s
   }
 }
 
+TEST_CASE("vertices of STL that differ by rounding errors of zero are one vertex") {
+  std::string text = text_stl();
+  // The coordinate of every other vertex is a rounding error where it is zero; 1e-6 is none.
+  bool odd = false;
+  for (std::size_t at = 0; (at = text.find(" 0", at)) != text.npos; at += 2)
+    if (odd = !odd; odd) text.replace(at, 2, text[at - 1] == '0' ? " -2.5e-33" : " 1.2e-17");
+  REQUIRE_THAT(text, Contains("e-33") && Contains("e-17"));
+  const TriangleMesh mesh = read_triangles("a.stl", text);
+  CHECK(mesh.positions.size() == 4);
+  CHECK(mesh.triangles == std::vector<std::array<Index, 3>>{{0, 1, 2}, {0, 2, 3}, {2, 1, 3}, {1, 0, 3}});
+  std::string far = text_stl();
+  far.replace(far.find("vertex 0 0 0"), 12, "vertex 0 0 1e-6");
+  CHECK(read_triangles("a.stl", far).positions.size() == 5);
+}
+
 TEST_CASE("bytes after the last facet of a binary STL are told, and refused where they could be attributes") {
   std::vector<std::string> warnings;
   read_triangles("a.stl", binary_stl("solid b", 0) + "more", &warnings);
