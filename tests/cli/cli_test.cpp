@@ -494,7 +494,7 @@ TEST_CASE("Every verb explains itself", "[cli][slow]") {
   CHECK(place.run("help template auto").out == place.run("template auto --help").out);
 }
 
-TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]") {
+TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[slow][cli]") {
   const Workplace place;
   const Run words = place.run("check template.mesh --target target.off");
   CHECK(words.status == 0);

@@ -161,7 +161,7 @@ TEST_CASE("subdivide shows the surface of the rule it is given, and tells of the
   CHECK(highest_shown == Approx(highest_point));
 }
 
-TEST_CASE("subdivide checks what it has written", "[cli]") {
+TEST_CASE("subdivide checks what it has written", "[slow][cli]") {
   const Workplace place;
   subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
   for (const std::size_t v : {4, 5, 6, 7}) mesh.positions[v].z() = 2.5;  // the upper cell stands on its head

@@ -103,7 +103,7 @@ TEST_CASE("check: Lagrange cells of a .vtu are judged as they stand", "[cli]") {
   CHECK(place.json("inverted.json")["valid"] == false);
 }
 
-TEST_CASE("optimize: curved cells of other programs are untangled, and their boundary keeps its shape", "[cli]") {
+TEST_CASE("optimize: curved cells of other programs are untangled, and their boundary keeps its shape", "[slow][cli]") {
   const Workplace place;
   const VolumeMesh block = lattice(3, 3, 3);
   HighOrderMesh mesh(ElementSpace(block, Basis::legendre, 2), block);
@@ -157,7 +157,7 @@ TEST_CASE("fit and optimize: curved cells of other programs are the start of a f
   CHECK_THAT(place.run("fit target.off --template curved.msh -o x.mesh").err, Contains("fit --order"));
 }
 
-TEST_CASE("convert, optimize: linear cells that are not valid though the curved ones are, are told", "[cli]") {
+TEST_CASE("convert, optimize: linear cells that are not valid though the curved ones are, are told", "[slow][cli]") {
   // A tet whose edge nodes bend it so far that one of eight linear tets is inverted.
   const Workplace place;
   place.file("tet.msh",

@@ -28,7 +28,7 @@ std::string npy(const LabelGrid& grid) {
 
 }  // namespace
 
-TEST_CASE("With a template, too, the interfaces of a mesh are targets", "[cli][regions]") {
+TEST_CASE("With a template, too, the interfaces of a mesh are targets", "[slow][cli][regions]") {
   const Workplace place;
   const auto layers = [&](const char* name, double first, double second) {
     VolumeMesh mesh = lattice(3, 3, 3);

@@ -134,7 +134,7 @@ TEST_CASE("merge keeps regions of two meshes apart and warns of numbers and name
 }
 
 TEST_CASE("shell grows layers on the outer surface of regions, or on the boundary of one of them",
-          "[cli][regions][shell]") {
+          "[slow][cli][regions][shell]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());
   const subvol::TriangleMesh slabs = subvol::test::slabs_surface(2);

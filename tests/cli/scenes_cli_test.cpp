@@ -90,7 +90,7 @@ TEST_CASE("Options of scenes are warned of if no output is one", "[cli]") {
   CHECK(used.err.find("no effect") == std::string::npos);
 }
 
-TEST_CASE("Parts that there are not are refused before any work", "[cli]") {
+TEST_CASE("Parts that there are not are refused before any work", "[slow][cli]") {
   const Workplace place;
   for (const char* words : {"convert template.mesh -o animation:a.glb", "convert template.mesh -o cage:a.mesh",
                             "convert target.off -o cutaway:a.glb", "convert template.mesh -o cutaway:a.mesh",
@@ -139,7 +139,7 @@ TEST_CASE("The version names what the program was made with", "[cli]") {
     CHECK(run.out.find(name) != std::string::npos);
 }
 
-TEST_CASE("A shell completes verbs, options and their words", "[cli]") {
+TEST_CASE("A shell completes verbs, options and their words", "[slow][cli]") {
   const Workplace place;
   for (const char* shell : {"bash", "zsh", "fish"}) {
     const Run run = place.run(std::string("completion ") + shell);

@@ -68,7 +68,7 @@ TEST_CASE("Layers end in the plane of an oblique cut, and grow on no cap that is
   CHECK(border["distance_max_percent"] < 1e-10);
 }
 
-TEST_CASE("Groups of a surface arrive on its shell, and can be left out by name, number or place", "[cli]") {
+TEST_CASE("Groups of a surface arrive on its shell, and can be left out by name, number or place", "[slow][cli]") {
   const Workplace place;
   place.file("box.obj", kBox);
   const std::string words = "shell box.obj --thickness 0.1 --layers 2 --force -o a.msh -o a.mesh --report r.json ";

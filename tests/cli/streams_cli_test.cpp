@@ -77,7 +77,7 @@ TEST_CASE("A standard output that cannot be written to is an error, and costs no
   CHECK(content_of(place / "err").empty());
 }
 
-TEST_CASE("Inputs that are pipes, devices or folders are refused, not waited for", "[cli]") {
+TEST_CASE("Inputs that are pipes, devices or folders are refused, not waited for", "[slow][cli]") {
   const Workplace place;
   REQUIRE(mkfifo((place / "pipe.mesh").c_str(), 0600) == 0);
   REQUIRE(mkfifo((place / "pipe.off").c_str(), 0600) == 0);

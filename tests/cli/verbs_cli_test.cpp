@@ -67,7 +67,8 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
     CHECK(glb.find(name) != std::string::npos);
 }
 
-TEST_CASE("A surface that faces inward is told, with holes or without, and called closed only if it is", "[cli]") {
+TEST_CASE("A surface that faces inward is told, with holes or without, and called closed only if it is",
+          "[slow][cli]") {
   const Workplace place;
   subvol::TriangleMesh ball = subvol::test::cube_surface(8, true);
   const std::string thin = " --thickness 1% --straight --force -o shell.mesh";
@@ -227,7 +228,7 @@ TEST_CASE("A shell refuses what it cannot use before it writes", "[cli][slow]") 
   CHECK_FALSE(place.has("a.mesh"));
 }
 
-TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
+TEST_CASE("check and convert take a high-order .vtu", "[slow][cli]") {
   const Workplace place;
   subvol::VolumeMesh straight = subvol::read_volume_mesh(place / "template.mesh");
   straight.references.assign(straight.num_cells(), 7);
@@ -270,7 +271,7 @@ TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
   CHECK(place.run("convert alien.vtu -o out2.mesh").status == 3);
 }
 
-TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could not make valid", "[cli]") {
+TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could not make valid", "[slow][cli]") {
   const Workplace place;
   subvol::VolumeMesh mesh = subvol::test::lattice(3, 3, 3);
   const subvol::MeshTopology topology(mesh);

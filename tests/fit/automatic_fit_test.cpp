@@ -36,7 +36,7 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
   CHECK(result.trials[result.chosen].cells == result.mesh.num_cells());
 }
 
-TEST_CASE("Stages that led to the chosen trial are kept in the report, others are not") {
+TEST_CASE("Stages that led to the chosen trial are kept in the report, others are not", "[slow]") {
   AutomaticFitOptions options{.cells = 400, .quality = kMostQuality};  // out of reach: several trials
   AutomaticFitResult result = fit_automatically(test::tetrahedron_surface(), options);
   REQUIRE(result.trials.size() > 1);

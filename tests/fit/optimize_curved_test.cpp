@@ -134,7 +134,7 @@ TEST_CASE("Optimizing curved cells refuses what it cannot take", "[optimize][ele
   CHECK_THROWS_AS(optimize_curved(mesh, block, {}), InputError);
 }
 
-TEST_CASE("A fit goes on from curved cells, with their orders or higher ones", "[high_order][elements]") {
+TEST_CASE("A fit goes on from curved cells, with their orders or higher ones", "[slow][high_order][elements]") {
   const VolumeMesh block = test::lattice(2, 2, 2);
   constexpr int kFine = 12;
   VolumeMesh fine = test::lattice(kFine, kFine, kFine);

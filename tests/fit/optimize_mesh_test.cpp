@@ -207,7 +207,7 @@ TEST_CASE("Optimization tells if a named plane inside the mesh is bent") {
   }));
 }
 
-TEST_CASE("Two tangled regions become valid, also if their volumes cannot be kept") {
+TEST_CASE("Two tangled regions become valid, also if their volumes cannot be kept", "[slow]") {
   for (const unsigned seed : {3u, 13u, 17u, 18u}) {
     CAPTURE(seed);
     VolumeMesh mesh = test::lattice(4, 4, 4);

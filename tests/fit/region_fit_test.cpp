@@ -92,7 +92,7 @@ TEST_CASE("Layers on both sides of a tilted interface end at the sides of the bo
   CHECK(result.trials[result.chosen].max_percent < 1e-3);
 }
 
-TEST_CASE("The layers around a core that is cut across go through both of its parts", "[regions]") {
+TEST_CASE("The layers around a core that is cut across go through both of its parts", "[slow][regions]") {
   const TriangleMesh lower = test::layered_cylinder({0.5, 1}, 1, 48);
   TriangleMesh upper = lower;
   for (Vec3& p : upper.positions) p.z() += 1;

@@ -310,7 +310,7 @@ TEST_CASE("The report of a batch is one page, and compares with another", "[cli]
   CHECK(place.run("batch merge with20 with60 -o all.jsonl").status == 0);
 }
 
-TEST_CASE("A row on the command line is a batch of one, whose record can be printed", "[cli][batch]") {
+TEST_CASE("A row on the command line is a batch of one, whose record can be printed", "[slow][cli][batch]") {
   const Workplace place;
   const std::string words = R"(batch --row {"id":"x","verb":"check","input":"target.off"} -o out --print --quiet)";
   const Run first = place.run(words);

@@ -148,7 +148,7 @@ TEST_CASE("Of a two-sided surface one side is left", "[mending]") {
   CHECK_FALSE(internal::without_second_sides(touching));
 }
 
-TEST_CASE("A surface that even a wrap does not follow is refused", "[mending]") {
+TEST_CASE("A surface that even a wrap does not follow is refused", "[slow][mending]") {
   CHECK_THROWS_WITH(repair_surface(triangle_soup(100, 0.3, 4)),
                     Catch::Contains("pairs of triangles cross") && Catch::Contains("it bounds no solid: even a wrap"));
 }

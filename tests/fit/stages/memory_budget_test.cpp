@@ -9,7 +9,8 @@
 
 using namespace subvol::internal;
 
-TEST_CASE("Memory of a first part, whatever its size, does not count for each cell of the next", "[memory_budget]") {
+TEST_CASE("Memory of a first part, whatever its size, does not count for each cell of the next",
+          "[slow][memory_budget]") {
   const double held = static_cast<double>(held_memory_bytes());
   MemoryBudget budget(held + 600e6, kMemoryOfLevelCell);
   CHECK(budget.allows(100));

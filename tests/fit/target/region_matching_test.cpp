@@ -60,7 +60,7 @@ TEST_CASE("Regions of a template find those of the target one to one", "[region_
 }
 
 TEST_CASE("A target whose regions the template lacks counts as its outer surface, with a warning",
-          "[region_matching]") {
+          "[slow][region_matching]") {
   const TriangleMesh target = surface_of_regions(layers(0.3, 0.6)).mesh;
   VolumeMesh start = layers(0.3, 0.6);
   start.references.assign(start.num_cells(), 1);

@@ -309,7 +309,7 @@ TEST_CASE("Automatic templates do not depend on chance, and can be cancelled", "
   CHECK_THROWS_AS(auto_templates(comb(), {.cells = 100}, 0), InputError);
 }
 
-TEST_CASE("Real targets get templates of their topology", "[templates][data]") {
+TEST_CASE("Real targets get templates of their topology", "[slow][templates][data]") {
   const auto folder = test::require_data();
   if (!folder) return;
   for (const char* name : {"rod59", "hanger139", "far_asm122"}) {
