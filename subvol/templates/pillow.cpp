@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/pillow.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
@@ -159,26 +160,21 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
 /// Returns the faces of those connected parts of a boundary that are wanted.
 std::vector<SetFace> chosen_parts(std::span<const SetFace> faces, std::size_t num_vertices, int reference,
                                   const PillowChoice& takes) {
-  std::vector<Index> part(num_vertices);
-  std::iota(part.begin(), part.end(), 0);
-  const auto root = [&](Index v) {
-    while (part[v] != v) v = part[v] = part[part[v]];
-    return v;
-  };
+  DisjointSets vertices(num_vertices);
   for (const SetFace& face : faces)
-    for (const Index v : face.vertices()) part[root(v)] = root(face.corners[0]);
+    for (const Index v : face.vertices()) vertices.join(v, face.corners[0]);
   std::map<Index, std::vector<std::array<Index, 4>>> parts;
   const auto corners = [](const SetFace& face) {
     std::array<Index, 4> all = face.corners;
     for (std::size_t i = face.size; i < all.size(); ++i) all[i] = kNoIndex;
     return all;
   };
-  for (const SetFace& face : faces) parts[root(face.corners[0])].push_back(corners(face));
+  for (const SetFace& face : faces) parts[vertices.of(face.corners[0])].push_back(corners(face));
   std::map<Index, bool> is_wanted;
   for (const auto& [first, members] : parts) is_wanted[first] = takes(reference, members);
   std::vector<SetFace> chosen;
   for (const SetFace& face : faces)
-    if (is_wanted[root(face.corners[0])]) chosen.push_back(face);
+    if (is_wanted[vertices.of(face.corners[0])]) chosen.push_back(face);
   return chosen;
 }
 
