@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/templates/sheet.h"
+#include "subvol/templates/cell_sheet.h"
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
