@@ -141,7 +141,7 @@ MeshPointer make_refined(const py::object& object, const py::kwargs& given) {
   CellChoice choice(keywords);
   choice.take_thin(keywords);
   keywords.finish();
-  const auto mesh = sound_volume_from(object, "mesh");
+  const auto mesh = valid_volume_from(object, "mesh");
   choice.prepare(*mesh, "refine: give one of inside, box, list and thin");
   bool any = false;
   MeshPointer refined = made([&] {

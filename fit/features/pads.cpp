@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/features/patch_fans.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/templates/template_edit.h"
 
 #include <Eigen/Geometry>
@@ -266,7 +267,7 @@ std::string to_string(PadProblem problem) {
 
 PatchedMesh patched_mesh(VolumeMesh mesh, std::vector<Vec3> fitted, const FeatureRouting& routing,
                          const TriangleMesh& target) {
-  require_sound(mesh, "patched_mesh");
+  require_valid(mesh, "patched_mesh");
   mesh.tags = {};
   const MeshTopology topology(mesh);
   PatchedMesh patched;

@@ -387,6 +387,14 @@ class Validator {
 
 std::vector<MeshDefect> validate(const VolumeMesh& mesh) { return Validator(mesh).run(); }
 
+void require_valid(const VolumeMesh& mesh, const std::string& what, InvertedCells inverted) {
+  for (const MeshDefect& defect : validate(mesh)) {
+    const bool is_allowed = defect.kind == Kind::unused_vertex ||
+                            (defect.kind == Kind::inverted_cell && inverted == InvertedCells::allowed);
+    if (!is_allowed) throw InputError(what + ": " + defect.message);
+  }
+}
+
 void require_groups(const VolumeFaceGroups& groups, const std::string& what) {
   for (const GroupedFace& entry : groups.faces)
     if (entry.group < 0 || static_cast<std::size_t>(entry.group) >= groups.groups.size())

@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
-#include "subvol/templates/template_edit.h"
+#include "subvol/mesh/validate.h"
 
 #include <algorithm>
 #include <array>
@@ -107,18 +107,18 @@ void inherit_groups(const VolumeMesh& mesh, VolumeMesh& result) {
 }  // namespace
 
 VolumeMesh split_into_tets(const VolumeMesh& mesh) {
-  require_sound(mesh, "split");
+  require_valid(mesh, "split");
   VolumeMesh result;
   result.positions = mesh.positions;
   result.tags = mesh.tags;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) fan_tets(mesh, c, result);
-  require_sound(result, "split");
+  require_valid(result, "split");
   inherit_groups(mesh, result);
   return result;
 }
 
 VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
-  require_sound(mesh, "split");
+  require_valid(mesh, "split");
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
     if (mesh.kinds[c] != CellKind::hex) throw InputError("split: cell " + std::to_string(c) + " is no hex");
   const MeshTopology topology(mesh);
@@ -190,7 +190,7 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
       if (!mesh.references.empty()) result.references.push_back(mesh.references[c]);
     }
   }
-  require_sound(result, "split");
+  require_valid(result, "split");
   inherit_groups(mesh, result);
   return result;
 }

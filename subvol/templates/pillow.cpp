@@ -5,6 +5,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/templates/template_edit.h"
 
@@ -310,14 +311,14 @@ std::vector<Index> own_numbers(const VolumeMesh& mesh) {
 }  // namespace
 
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
-  require_sound(mesh, "pillow");
+  require_valid(mesh, "pillow");
   const std::vector<char> in_set = marked(mesh, cells);
   std::vector<Index> origins = own_numbers(mesh);
   return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set, origins);
 }
 
 VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
-  require_sound(mesh, "pillow");
+  require_valid(mesh, "pillow");
   VolumeMesh result = mesh;
   std::vector<Index> origins = own_numbers(mesh);
   for (const int reference : region_references(mesh)) {

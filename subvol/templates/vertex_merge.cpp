@@ -5,6 +5,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/templates/template_edit.h"
 
 #include <algorithm>
@@ -153,7 +154,7 @@ VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target,
   const std::vector<char> all(merged.num_cells(), 1);
   FeatureTags tags = std::move(merged.tags);  // checked only after the cells have proved valid
   merged.tags = {};
-  require_sound(merged, name);
+  require_valid(merged, name);
   merged.tags = std::move(tags);
   merged.regions = mesh.regions;
   merged.face_groups = merged_groups(mesh.face_groups, target);
