@@ -4,8 +4,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/export/text_format.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,12 +29,11 @@ std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
 }
 
 std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
-  std::vector<Vec3> areas(mesh.num_faces(), Vec3::Zero());
+  std::vector<Vec3> areas;
+  areas.reserve(mesh.num_faces());
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
-    const Vec3& first = mesh.positions[mesh.face_vertices[mesh.face_offsets[f]]];
-    for (std::size_t k = mesh.face_offsets[f] + 1; k + 1 < mesh.face_offsets[f + 1]; ++k)
-      areas[f] += (mesh.positions[mesh.face_vertices[k]] - first)
-                      .cross(mesh.positions[mesh.face_vertices[k + 1]] - first) / 2;
+    const std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1];
+    areas.push_back(doubled_area_vector(mesh.positions, std::span(mesh.face_vertices).subspan(begin, end - begin)) / 2);
   }
   return areas;
 }

@@ -7,6 +7,7 @@
 #include "subvol/mesh/features.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/by_number.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -30,16 +31,6 @@ std::span<const Index> corners_of(const PolygonMesh& surface, std::size_t face) 
   return {surface.face_vertices.data() + begin, surface.face_offsets[face + 1] - begin};
 }
 
-/// Twice the area of a face times its mean normal.
-Vec3 area_vector(const PolygonMesh& surface, std::size_t face) {
-  const auto corners = corners_of(surface, face);
-  Vec3 sum = Vec3::Zero();
-  const Vec3& origin = surface.positions[corners[0]];
-  for (std::size_t k = 1; k + 1 < corners.size(); ++k)
-    sum += (surface.positions[corners[k]] - origin).cross(surface.positions[corners[k + 1]] - origin);
-  return sum;
-}
-
 /// Divides a surface into patches: faces connected through edges of two faces that are no sharper than an angle.
 /// Returns the smallest face of each face's patch.
 std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
@@ -52,7 +43,7 @@ std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
   std::vector<Vec3> normals;
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     const auto corners = corners_of(surface, f);
-    normals.push_back(area_vector(surface, f).stableNormalized());
+    normals.push_back(doubled_area_vector(surface.positions, corners).stableNormalized());
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const Index from = corners[k], to = corners[(k + 1) % corners.size()];
       sides.push_back({std::min(from, to), std::max(from, to), static_cast<Index>(f), from < to});
@@ -125,7 +116,7 @@ PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags
     if (is_left_out[f]) left_out[patch[f]].push_back(f);
   for (const auto& [name, faces] : left_out) {
     Vec3 normal = Vec3::Zero();
-    for (const std::size_t f : faces) normal += area_vector(surface, f);
+    for (const std::size_t f : faces) normal += doubled_area_vector(surface.positions, corners_of(surface, f));
     if (!(normal.norm() > 0)) continue;
     normal.normalize();
     BorderPlane plane{normal, {}};

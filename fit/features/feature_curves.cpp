@@ -38,8 +38,7 @@ std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double a
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
         throw InputError("feature_curves: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
                          " of " + std::to_string(mesh.positions.size()));
-    const Vec3& a = mesh.positions[q[0]];
-    normals.push_back((mesh.positions[q[1]] - a).cross(mesh.positions[q[2]] - a).normalized());
+    normals.push_back(unit_normal(mesh, static_cast<Index>(t)));
     for (int i = 0; i < 3; ++i) {
       const Index v = q[i], w = q[(i + 1) % 3];
       if (v != w) sides.push_back({std::min(v, w), std::max(v, w), static_cast<Index>(t), v < w});

@@ -7,6 +7,7 @@
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/sheets.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -124,8 +125,7 @@ void FitTarget::add_interfaces() {
   all.positions.insert(all.positions.end(), interfaces.positions.begin(), interfaces.positions.end());
   for (std::size_t t = 0; t < interfaces.triangles.size(); ++t) {
     const auto& [a, b, c] = interfaces.triangles[t];
-    const std::vector<Vec3>& x = interfaces.positions;
-    if (!((x[b] - x[a]).cross(x[c] - x[a]).norm() > 0)) continue;
+    if (!(doubled_area_vector(interfaces, interfaces.triangles[t]).norm() > 0)) continue;
     all.triangles.push_back({first + a, first + b, first + c});
     group_of_triangle.push_back(group_of_interface_triangle[t]);
   }

@@ -4,6 +4,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/subdivision/surface_refinement.h"
 #include "subvol/surface/sheets.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -80,12 +81,7 @@ void find_flattened(const VolumeMesh& mesh, const MeshTopology& topology, Subdiv
 }
 
 Vec3 face_normal(const SurfaceTopology& surface, Index f, std::span<const Vec3> points) {
-  Vec3 area = Vec3::Zero();
-  const auto face = surface.face(f);
-  const Vec3& origin = points[face[0]];
-  for (std::size_t i = 1; i + 1 < face.size(); ++i)
-    area += (points[face[i]] - origin).cross(points[face[i + 1]] - origin);
-  return area.normalized();
+  return doubled_area_vector(points, surface.face(f)).normalized();
 }
 
 bool is_reflex(const SurfaceTopology& surface, Index e, std::span<const Vec3> points) {

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/auto_template.h"
 #include "subvol/templates/plane_grid.h"
 #include "subvol/templates/search_stop.h"
@@ -30,8 +31,7 @@ constexpr double kAllPlanes = 0.999;  ///< share from which on the grid is taken
 
 double area_of(const TriangleMesh& mesh) {
   double area = 0;
-  for (const auto& [a, b, c] : mesh.triangles)
-    area += 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
+  for (const auto& t : mesh.triangles) area += triangle_area(mesh, t);
   return area;
 }
 
