@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/feature_curves.h"
 
+#include "subvol/base/angle.h"
 #include "subvol/base/error.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"

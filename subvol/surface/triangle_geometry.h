@@ -6,17 +6,10 @@
 #include <Eigen/Geometry>
 
 #include <array>
-#include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <span>
 
 namespace subvol::internal {
-
-/// Returns an angle in [0, 180]; 0 if a vector vanishes. Uses atan2: acos would lose half the digits near 0 and 180.
-inline double angle_degrees_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
-}
 
 /// Returns the cross product of two sides of a triangle: twice its area long, along its normal.
 inline Vec3 doubled_area_vector(const TriangleMesh& mesh, const std::array<Index, 3>& triangle) {
@@ -35,6 +28,12 @@ inline Vec3 doubled_area_vector(std::span<const Vec3> positions, std::span<const
 
 inline double triangle_area(const TriangleMesh& mesh, const std::array<Index, 3>& triangle) {
   return doubled_area_vector(mesh, triangle).norm() / 2;
+}
+
+/// Returns the unit normal of a triangle, or that of the mean plane of a quad; zero if it has no area.
+inline Vec3 normal_of_face(std::span<const Vec3> positions, std::span<const Index> face) {
+  const auto p = [&](std::size_t i) -> const Vec3& { return positions[face[i]]; };
+  return (face.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
 }
 
 /// Returns six times the volume between a triangle and a point, negative if the point is on the side of its normal.

@@ -7,9 +7,8 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/surface_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/template_edit.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -96,11 +95,6 @@ void require_manifold(std::span<const SetFace> faces, std::span<const Index> num
   }
 }
 
-Vec3 unit_normal(const VolumeMesh& mesh, std::span<const Index> face) {
-  const auto p = [&](std::size_t i) -> const Vec3& { return mesh.positions[face[i]]; };
-  return (face.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
-}
-
 /// Displacement of each vertex of the faces: against the sum of its distinct normals, in proportion to its shortest
 /// edge in the set.
 std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set) {
@@ -117,7 +111,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
   }
   std::vector<std::vector<Vec3>> normals(mesh.num_vertices());
   for (const SetFace& face : faces) {
-    const Vec3 n = unit_normal(mesh, face.vertices());
+    const Vec3 n = normal_of_face(mesh.positions, face.vertices());
     for (Index v : face.vertices())
       if (std::none_of(normals[v].begin(), normals[v].end(), [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
         normals[v].push_back(n);
