@@ -31,10 +31,8 @@ std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
 std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
   std::vector<Vec3> areas;
   areas.reserve(mesh.num_faces());
-  for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
-    const std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1];
-    areas.push_back(doubled_area_vector(mesh.positions, std::span(mesh.face_vertices).subspan(begin, end - begin)) / 2);
-  }
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    areas.push_back(doubled_area_vector(mesh.positions, mesh.face(f)) / 2);
   return areas;
 }
 
