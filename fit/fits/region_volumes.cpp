@@ -7,6 +7,8 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
