@@ -38,12 +38,12 @@ set(entry_points
   # Templates
   subvol/templates/auto_template.h
   subvol/templates/carve.h
+  subvol/templates/cell_sheet.h
   subvol/templates/cell_split.h
   subvol/templates/label_surface.h
   subvol/templates/pillow.h
   subvol/templates/refine.h
   subvol/templates/region_template.h
-  subvol/templates/sheet.h
   subvol/templates/template_edit.h
   subvol/templates/vertex_merge.h
   # Fits, optimization, checks

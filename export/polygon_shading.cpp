@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/export/polygon_shading.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/export/text_format.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 namespace subvol::internal {
 namespace {
@@ -30,39 +29,31 @@ std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
 }
 
 std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
-  std::vector<Vec3> areas(mesh.num_faces(), Vec3::Zero());
-  for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
-    const Vec3& first = mesh.positions[mesh.face_vertices[mesh.face_offsets[f]]];
-    for (std::size_t k = mesh.face_offsets[f] + 1; k + 1 < mesh.face_offsets[f + 1]; ++k)
-      areas[f] += (mesh.positions[mesh.face_vertices[k]] - first)
-                      .cross(mesh.positions[mesh.face_vertices[k + 1]] - first) / 2;
-  }
+  std::vector<Vec3> areas;
+  areas.reserve(mesh.num_faces());
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    areas.push_back(doubled_area_vector(mesh.positions, mesh.face(f)) / 2);
   return areas;
 }
 
 /// Returns the first corner of the group of each corner: groups grow over smooth edges.
-std::vector<std::size_t> smooth_groups(const std::vector<Corner>& corners, const std::vector<Vec3>& areas,
-                                       double cos_angle) {
-  std::vector<std::pair<Index, std::size_t>> spokes;  // the other end of an edge at the vertex, and the corner
+std::vector<Index> smooth_groups(const std::vector<Corner>& corners, const std::vector<Vec3>& areas, double cos_angle) {
+  std::vector<std::pair<Index, Index>> spokes;  // the other end of an edge at the vertex, and the corner
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    spokes.push_back({corners[i].before, i});
-    spokes.push_back({corners[i].after, i});
+    spokes.push_back({corners[i].before, static_cast<Index>(i)});
+    spokes.push_back({corners[i].after, static_cast<Index>(i)});
   }
   std::sort(spokes.begin(), spokes.end());
-  std::vector<std::size_t> group(corners.size());
-  std::iota(group.begin(), group.end(), std::size_t{0});
-  const auto root = [&](std::size_t i) {
-    while (group[i] != i) i = group[i] = group[group[i]];
-    return i;
-  };
+  DisjointSets groups(corners.size());
   for (std::size_t s = 0; s < spokes.size(); ++s)
     for (std::size_t t = s + 1; t < spokes.size() && spokes[t].first == spokes[s].first; ++t) {
-      const std::size_t i = root(spokes[s].second), j = root(spokes[t].second);
-      const Vec3 &a = areas[corners[spokes[t].second].face], &b = areas[corners[spokes[s].second].face];
-      if (i != j && a.dot(b) > cos_angle * a.norm() * b.norm()) group[std::max(i, j)] = std::min(i, j);
+      const Index i = spokes[s].second, j = spokes[t].second;
+      const Vec3 &a = areas[corners[j].face], &b = areas[corners[i].face];
+      if (a.dot(b) > cos_angle * a.norm() * b.norm()) groups.join(i, j);
     }
-  for (std::size_t& g : group) g = root(g);
-  return group;
+  std::vector<Index> first;
+  for (std::size_t i = 0; i < corners.size(); ++i) first.push_back(groups.of(static_cast<Index>(i)));
+  return first;
 }
 
 }  // namespace
@@ -78,13 +69,13 @@ ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degre
   const auto corners_of = corners_of_vertices(mesh);
   for (std::size_t v = 0; v < corners_of.size(); ++v) {
     const std::vector<Corner>& corners = corners_of[v];
-    const std::vector<std::size_t> group = smooth_groups(corners, areas, cos_angle);
+    const std::vector<Index> first = smooth_groups(corners, areas, cos_angle);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      if (group[i] == i) {
+      if (first[i] == static_cast<Index>(i)) {
         shaded.corner_vertices[corners[i].entry] = static_cast<Index>(shaded.positions.size());
         shaded.positions.push_back(mesh.positions[v]);
       } else {
-        shaded.corner_vertices[corners[i].entry] = shaded.corner_vertices[corners[group[i]].entry];
+        shaded.corner_vertices[corners[i].entry] = shaded.corner_vertices[corners[first[i]].entry];
       }
     }
   }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/export/strip_cuts.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/export/chord_distance.h"
 
 #include <algorithm>
 #include <bit>
-#include <numeric>
 
 namespace subvol::internal {
 namespace {
@@ -149,19 +149,14 @@ std::vector<char> halve_above(double threshold, const Demand& demand, StripCuts&
 
 StripCuts::StripCuts(const PatchSurface& patches) : strips_(patches.num_patches()) {
   const SurfaceTopology& quads = patches.quads();
-  std::vector<Index> parent(quads.num_edges());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](Index side) {
-    while (parent[side] != side) side = parent[side] = parent[parent[side]];
-    return side;
-  };
-  const auto edge = [&](std::size_t patch, int side) { return root(quads.corner_edges[4 * patch + side]); };
+  DisjointSets edges(quads.num_edges());
+  const auto side = [&](std::size_t patch, int k) { return quads.corner_edges[4 * patch + k]; };
   for (std::size_t p = 0; p < strips_.size(); ++p)
-    for (int k : {0, 1}) parent[edge(p, k)] = edge(p, k + 2);
+    for (int k : {0, 1}) edges.join(side(p, k), side(p, k + 2));
   std::vector<Index> number(quads.num_edges(), kNoIndex);
   for (std::size_t p = 0; p < strips_.size(); ++p)
     for (int k : {0, 1}) {
-      Index& strip = number[edge(p, k)];
+      Index& strip = number[edges.of(side(p, k))];
       if (strip == kNoIndex) {
         strip = static_cast<Index>(cuts_.size());
         cuts_.push_back({0, PatchSurface::kUnits});

@@ -8,8 +8,7 @@
 #include "subvol/export/vtu_arrays.h"
 #include "subvol/io/zip_archive.h"
 #include "subvol/surface/boundary.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <bit>
@@ -34,10 +33,7 @@ void append_raw(std::string& bytes, T value) {
 }
 
 Vec3 normal_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
-  const auto x = [&](int k) -> const Vec3& {
-    return mesh.positions[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])];
-  };
-  const Vec3 normal = (x(1) - x(0)).cross(x(2) - x(0));
+  const Vec3 normal = doubled_area_vector(mesh, t);
   const double length = normal.norm();
   return length > 0 && std::isfinite(length) ? Vec3(normal / length) : Vec3(Vec3::Zero());
 }

@@ -328,10 +328,10 @@ AutomaticFitResult fit_automatically(const TriangleMesh& given, const AutomaticF
   }
   const AutomaticFitOptions checked = checked_options(options);
   const EdgeDecision edges = decide_about_edges(target, checked.crease_angle_degrees, checked.follows_all_edges);
-  const auto fit = [&](bool follows_borders, const AutomaticFitOptions& given) {
+  const auto fit = [&](bool follows_borders, const AutomaticFitOptions& chosen) {
     const EdgeChoice follows{edges.follows, follows_borders};
-    AutomaticFitResult result = follows.any() ? AutomaticFit(solid_boundary(target).surface, follows, given).run()
-                                              : AutomaticFit(target, follows, given).run();
+    AutomaticFitResult result = follows.any() ? AutomaticFit(solid_boundary(target).surface, follows, chosen).run()
+                                              : AutomaticFit(target, follows, chosen).run();
     if (!edges.warning.empty()) result.report.warnings.push_back(edges.warning);
     return result;
   };

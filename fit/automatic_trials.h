@@ -4,7 +4,7 @@
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/quality/quality.h"
-#include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/normalization.h"
 #include "subvol/fit/target/target_surface.h"
 
 #include <cstddef>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/high_order_driver.h"
 
-#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/elements/ideal_boxes.h"
@@ -50,8 +49,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
 }
 
 VolumeMesh checked_template(VolumeMesh mesh) {
-  for (const MeshDefect& defect : validate(mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  require_valid(mesh, "template mesh");
   require_no_pyramids(mesh.kinds, "template mesh: pyramids cannot be curved");
   return mesh;
 }

@@ -13,6 +13,7 @@
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -73,9 +74,7 @@ void check_topology(const VolumeMesh& mesh, const MeshTopology& topology, MeshCh
 double enclosed_volume(const TriangleMesh& surface) {
   const Vec3 origin = surface.triangles.empty() ? Vec3::Zero() : surface.positions[surface.triangles[0][0]];
   double sum = 0;
-  for (const auto& [a, b, c] : surface.triangles)
-    sum += (surface.positions[a] - origin)
-               .dot((surface.positions[b] - origin).cross(surface.positions[c] - origin));
+  for (const auto& t : surface.triangles) sum += sixfold_volume(surface.positions, t, origin);
   return sum / 6;
 }
 

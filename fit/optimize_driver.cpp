@@ -48,9 +48,7 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
 }
 
 VolumeMesh checked_mesh(VolumeMesh mesh) {
-  for (const MeshDefect& defect : validate(mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex && defect.kind != MeshDefect::Kind::inverted_cell)
-      throw InputError("mesh: " + defect.message);
+  require_valid(mesh, "mesh", InvertedCells::allowed);
   return mesh;
 }
 

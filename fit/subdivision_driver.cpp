@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/subdivision_driver.h"
 
-#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/certificate/certificate.h"
@@ -52,8 +51,7 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
                options.log}) {
-  for (const MeshDefect& defect : validate(template_mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  require_valid(template_mesh, "template mesh");
   require_no_pyramids(template_.kinds,
                       "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
   target_.normalization.take_in(template_);

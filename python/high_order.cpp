@@ -23,7 +23,7 @@ std::shared_ptr<CurvedMesh> make_curved(const py::object& object, int order, con
   Basis basis = HighOrderFitOptions{}.basis;
   keywords.take("basis", basis, bases());
   keywords.finish();
-  const auto mesh = sound_volume_from(object, "mesh");
+  const auto mesh = valid_volume_from(object, "mesh");
   require_no_pyramids(mesh->kinds, "mesh: pyramids cannot be curved");
   return std::make_shared<CurvedMesh>(
       CurvedMesh{HighOrderMesh(ElementSpace(*mesh, basis, order), *mesh), mesh->references, mesh->face_groups, mesh->regions});

@@ -29,7 +29,7 @@ struct Subdivision {
                    {"linear", Refinement::linear}});
     keywords.take("crease_angle", crease_angle);
     keywords.finish();
-    mesh = sound_volume_from(object, "mesh");
+    mesh = valid_volume_from(object, "mesh");
     if (!crease_angle) return;
     VolumeMesh creased = *mesh;
     creased.tags = merge_tags(creased.tags, features_by_angle(creased, *crease_angle));
@@ -63,7 +63,7 @@ std::shared_ptr<SparseMap> matrix_of(const py::object& object, const py::kwargs&
 }
 
 std::shared_ptr<SparseMap> limit_of(const py::object& object) {
-  const auto mesh = sound_volume_from(object, "mesh");
+  const auto mesh = valid_volume_from(object, "mesh");
   const py::gil_scoped_release unlocked;
   return std::make_shared<SparseMap>(limit_map(*mesh));
 }
@@ -73,7 +73,7 @@ SurfaceMesh limit_surface(const py::object& object, const py::kwargs& given) {
   cli::WritingOptions writing;
   take_chord(keywords, writing);
   keywords.finish();
-  const auto cage = sound_volume_from(object, "cage");
+  const auto cage = valid_volume_from(object, "cage");
   const py::gil_scoped_release unlocked;
   TessellatedSurface surface = cli::tessellated_limit(*cage, writing);
   SurfaceMesh mesh;

@@ -379,12 +379,10 @@ Cells cells_from(const py::object& object, const char* name, bool check) {
   return {nullptr, std::make_shared<const CurvedMesh>(std::get<HighOrderFile>(std::move(cells)))};
 }
 
-std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name) {
+std::shared_ptr<const VolumeMesh> valid_volume_from(const py::object& object, const char* name) {
   std::shared_ptr<const VolumeMesh> mesh = volume_from(object, name);
   if (is_path(object)) return mesh;  // the reader has checked it
-  for (const MeshDefect& defect : validate(*mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex && defect.kind != MeshDefect::Kind::inverted_cell)
-      throw InputError(std::string(name) + ": " + defect.message);
+  require_valid(*mesh, name, InvertedCells::allowed);
   return mesh;
 }
 

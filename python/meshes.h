@@ -39,7 +39,7 @@ struct Cells {
 Cells cells_from(const py::object& object, const char* name, bool check = true);
 /// Does the same as `volume_from` for functions that rely on a mesh that is valid except for inverted cells and unused
 /// points, else InputError.
-std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name);
+std::shared_ptr<const VolumeMesh> valid_volume_from(const py::object& object, const char* name);
 /// A surface, or the boundary of a volume mesh: as triangles, or as polygons with tags. InputError: points not finite.
 TriangleMesh triangles_from(const py::object& object, const char* name);
 SurfaceMesh surface_from(const py::object& object, const char* name);

@@ -10,10 +10,10 @@
 #include "subvol/shell/extrude.h"
 #include "subvol/templates/auto_template.h"
 #include "subvol/templates/carve.h"
+#include "subvol/templates/cell_sheet.h"
 #include "subvol/templates/cell_split.h"
 #include "subvol/templates/pillow.h"
 #include "subvol/templates/refine.h"
-#include "subvol/templates/sheet.h"
 #include "subvol/templates/vertex_merge.h"
 #include "subvol/templates/voxel_grid.h"
 
@@ -141,7 +141,7 @@ MeshPointer make_refined(const py::object& object, const py::kwargs& given) {
   CellChoice choice(keywords);
   choice.take_thin(keywords);
   keywords.finish();
-  const auto mesh = sound_volume_from(object, "mesh");
+  const auto mesh = valid_volume_from(object, "mesh");
   choice.prepare(*mesh, "refine: give one of inside, box, list and thin");
   bool any = false;
   MeshPointer refined = made([&] {

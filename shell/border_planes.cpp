@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/border_planes.h"
 
+#include "subvol/surface/triangle_geometry.h"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
@@ -11,6 +13,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// Returns the normal of the plane of some points, or nothing if they are not in one plane, or nearly on a line.
@@ -64,11 +68,7 @@ class FlatBorders {
 };
 
 Vec3 FlatBorders::normal_of_face(Index corner) const {
-  const auto face = topology_.face(topology_.corner_faces[corner]);
-  Vec3 sum = Vec3::Zero();
-  for (std::size_t k = 1; k + 1 < face.size(); ++k)
-    sum += (positions_[face[k]] - positions_[face[0]]).cross(positions_[face[k + 1]] - positions_[face[0]]);
-  return sum.stableNormalized();
+  return doubled_area_vector(positions_, topology_.face(topology_.corner_faces[corner])).stableNormalized();
 }
 
 std::vector<Run> FlatBorders::loops() const {

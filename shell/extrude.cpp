@@ -3,8 +3,8 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/mending/visible_normals.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/shell/shell_layers.h"
-#include "subvol/templates/template_edit.h"
 
 #include <cmath>
 #include <string>
@@ -35,7 +35,7 @@ VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options) {
   mesh.tags = shell_tags(layers, options.tags);
   mesh.positions = straight_columns(layers, directions, std::vector<double>(layers.num_strands(), options.thickness));
   if (!surface.face_groups.empty()) mesh.face_groups = shell_groups(layers);
-  require_sound(mesh, "extrude");
+  require_valid(mesh, "extrude");
   return mesh;
 }
 

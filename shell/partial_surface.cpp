@@ -7,6 +7,7 @@
 #include "subvol/mesh/features.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/by_number.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -25,21 +26,6 @@ namespace subvol {
 using namespace internal;
 namespace {
 
-std::span<const Index> corners_of(const PolygonMesh& surface, std::size_t face) {
-  const std::size_t begin = surface.face_offsets[face];
-  return {surface.face_vertices.data() + begin, surface.face_offsets[face + 1] - begin};
-}
-
-/// Twice the area of a face times its mean normal.
-Vec3 area_vector(const PolygonMesh& surface, std::size_t face) {
-  const auto corners = corners_of(surface, face);
-  Vec3 sum = Vec3::Zero();
-  const Vec3& origin = surface.positions[corners[0]];
-  for (std::size_t k = 1; k + 1 < corners.size(); ++k)
-    sum += (surface.positions[corners[k]] - origin).cross(surface.positions[corners[k + 1]] - origin);
-  return sum;
-}
-
 /// Divides a surface into patches: faces connected through edges of two faces that are no sharper than an angle.
 /// Returns the smallest face of each face's patch.
 std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
@@ -51,8 +37,8 @@ std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
   std::vector<Side> sides;
   std::vector<Vec3> normals;
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
-    const auto corners = corners_of(surface, f);
-    normals.push_back(area_vector(surface, f).stableNormalized());
+    const auto corners = surface.face(f);
+    normals.push_back(doubled_area_vector(surface.positions, corners).stableNormalized());
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const Index from = corners[k], to = corners[(k + 1) % corners.size()];
       sides.push_back({std::min(from, to), std::max(from, to), static_cast<Index>(f), from < to});
@@ -101,7 +87,7 @@ PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     if (is_left_out[f]) continue;
     result.face_numbers.push_back(static_cast<Index>(f));
-    for (const Index v : corners_of(surface, f)) {
+    for (const Index v : surface.face(f)) {
       if (number[v] == kNoIndex) {
         number[v] = static_cast<Index>(result.vertex_numbers.size());
         result.vertex_numbers.push_back(v);
@@ -125,14 +111,14 @@ PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags
     if (is_left_out[f]) left_out[patch[f]].push_back(f);
   for (const auto& [name, faces] : left_out) {
     Vec3 normal = Vec3::Zero();
-    for (const std::size_t f : faces) normal += area_vector(surface, f);
+    for (const std::size_t f : faces) normal += doubled_area_vector(surface.positions, surface.face(f));
     if (!(normal.norm() > 0)) continue;
     normal.normalize();
     BorderPlane plane{normal, {}};
-    const Vec3& origin = surface.positions[corners_of(surface, faces[0])[0]];
+    const Vec3& origin = surface.positions[surface.face(faces[0])[0]];
     bool is_flat = true;
     for (const std::size_t f : faces)
-      for (const Index v : corners_of(surface, f)) {
+      for (const Index v : surface.face(f)) {
         is_flat = is_flat && std::abs(normal.dot(surface.positions[v] - origin)) <= tolerance;
         if (number[v] != kNoIndex) plane.vertices.push_back(number[v]);
       }

@@ -8,6 +8,7 @@
 #include "subvol/fit/mending/visible_normals.h"
 #include "subvol/fit/solver/free_nodes.h"
 #include "subvol/fit/solver/newton.h"
+#include "subvol/fit/target/normalization.h"
 #include "subvol/shell/thickness.h"
 #include "subvol/surface/boundary.h"
 
@@ -46,23 +47,13 @@ void check_options(const PolygonMesh& surface, const ShellOptions& options) {
       throw InputError("shell: the thickness at vertex " + std::to_string(v) + " must be positive");
 }
 
-/// Maps a surface to a box of diagonal 1 around the origin, and results back.
-struct Normalization {
-  Vec3 center;
-  double scale;  ///< diagonal of the surface's bounding box, in the caller's unit
-
-  explicit Normalization(const PolygonMesh& surface) {
-    Eigen::AlignedBox3d box;
-    for (const Vec3& p : surface.positions) box.extend(p);
-    center = box.center();
-    scale = box.diagonal().norm();
-    if (!(scale > 0) || !std::isfinite(scale)) throw InputError("shell: the surface has no finite extent");
-  }
-  PolygonMesh normalized(PolygonMesh surface) const {
-    for (Vec3& p : surface.positions) p = (p - center) / scale;
-    return surface;
-  }
-};
+Normalization normalization_of(const PolygonMesh& surface) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : surface.positions) box.extend(p);
+  const double diagonal = box.diagonal().norm();
+  if (!(diagonal > 0) || !std::isfinite(diagonal)) throw InputError("shell: the surface has no finite extent");
+  return {box.center(), diagonal};
+}
 
 /// Makes one shell from its surface, in normalized coordinates.
 class ShellMaker {
@@ -70,7 +61,7 @@ class ShellMaker {
   ShellMaker(const PolygonMesh& surface, const ShellOptions& options)
       : given_(surface),
         options_(options),
-        normalization_(surface),
+        normalization_(normalization_of(surface)),
         layers_(normalized_layers(surface)),
         cells_(stack_cells(layers_)),
         check_(layers_, cells_, CheckedSheets::outer, options.free_surface) {}
@@ -113,7 +104,7 @@ class ShellMaker {
     ShellLayers layers = make_layers(surface, options_.side == ShellSide::outward ? 0 : options_.layers,
                                      options_.side == ShellSide::inward ? 0 : options_.layers, options_.growth,
                                      {options_.vertex_numbers, options_.face_numbers});
-    layers.surface = normalization_.normalized(std::move(layers.surface));
+    layers.surface.positions = normalization_.to_unit(std::move(layers.surface.positions));
     return layers;
   }
 
@@ -193,8 +184,8 @@ void ShellMaker::find_thickness() {
   asked_.assign(layers_.num_strands(), 0);
   for (std::size_t v = 0; v < n; ++v) {
     const double t = options_.vertex_thickness.empty() ? options_.thickness : options_.vertex_thickness[v];
-    if (layers_.inside > 0) asked_[v] = t / normalization_.scale;
-    if (layers_.outside > 0) asked_[n + v] = t / normalization_.scale;
+    if (layers_.inside > 0) asked_[v] = t / normalization_.diagonal;
+    if (layers_.outside > 0) asked_[n + v] = t / normalization_.diagonal;
   }
   thickness_ = limited_thickness(layers_, directions_, asked_);
 }
@@ -361,7 +352,7 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
 
 void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   const double before = seconds();
-  const double scale = normalization_.scale;
+  const double scale = normalization_.diagonal;
   result.layers = std::move(layers_);
   result.layers.surface = surface;
   result.mesh = std::move(cells_);

@@ -77,9 +77,7 @@ std::vector<Index> ShellCheck::strands(const ShellFailures& failures) const {
   };
   for (const Index c : failures.certificate.not_certified) add(cells_.cell(c));
   for (const auto& pair : failures.intersecting)
-    for (const Index f : pair)
-      add({polygons_.face_vertices.data() + polygons_.face_offsets[f],
-           polygons_.face_offsets[f + 1] - polygons_.face_offsets[f]});
+    for (const Index f : pair) add(polygons_.face(f));
   sort_unique(result);
   return result;
 }

@@ -19,11 +19,6 @@ namespace subvol {
 using namespace internal;
 namespace {
 
-std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
-  const std::size_t begin = surface.face_offsets[f];
-  return {surface.face_vertices.data() + begin, surface.face_offsets[f + 1] - begin};
-}
-
 void require_faces(const PolygonMesh& surface, const SurfaceNames& names) {
   if (surface.num_faces() == 0) throw InputError("the surface has no faces");
   const auto face_name = [&](std::size_t f) {
@@ -34,7 +29,7 @@ void require_faces(const PolygonMesh& surface, const SurfaceNames& names) {
   for (std::size_t v = 0; v < used.size(); ++v)
     if (!surface.positions[v].allFinite()) throw InputError("vertex " + std::to_string(v) + " is not finite");
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
-    const auto face = face_of(surface, f);
+    const auto face = surface.face(f);
     for (std::size_t k = 0; k < face.size(); ++k) {
       if (face[k] < 0 || static_cast<std::size_t>(face[k]) >= used.size())
         throw InputError(face_name(f) + " names vertex " + std::to_string(face[k]) + " of " +
@@ -161,7 +156,7 @@ VolumeMesh stack_cells(const ShellLayers& layers) {
     mesh.positions.insert(mesh.positions.end(), layers.surface.positions.begin(), layers.surface.positions.end());
   for (int layer = 0; layer + 1 < layers.num_sheets(); ++layer)
     for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
-      add_cell(mesh, layers, face_of(layers.surface, f), layer);
+      add_cell(mesh, layers, layers.surface.face(f), layer);
       mesh.references.push_back(layer + 1);
     }
   return mesh;
@@ -220,7 +215,7 @@ CellReference shell_reference(const ShellLayers& layers, std::vector<double> thi
   return [&layers, thickness = std::move(thickness)](Index cell, const Vec3& point) {
     const std::size_t num_faces = layers.surface.num_faces();
     const int layer = static_cast<int>(cell / num_faces);
-    const auto face = face_of(layers.surface, cell % num_faces);
+    const auto face = layers.surface.face(cell % num_faces);
     const double* side = thickness.data() + (layer < layers.inside ? 0 : layers.num_columns());
     const double share = layers.height(layer + 1) - layers.height(layer), u = point[0], v = point[1];
     const auto x = [&](int k) -> const Vec3& { return layers.surface.positions[face[k]]; };
@@ -257,7 +252,7 @@ VolumeFaceGroups shell_groups(const ShellLayers& layers) {
   std::array<Index, 4> corners;
   const auto add_sheet = [&](int sheet, const auto& group_of_face) {
     for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
-      const auto face = face_of(layers.surface, f);
+      const auto face = layers.surface.face(f);
       for (std::size_t k = 0; k < face.size(); ++k) corners[k] = layers.vertex(sheet, face[k]);
       result.faces.push_back({face_key({corners.data(), face.size()}), group_of_face(f)});
     }
@@ -299,7 +294,7 @@ PolygonMesh sheet_polygons(const ShellLayers& layers, std::span<const int> sheet
   const auto end_face = [&] { polygons.face_offsets.push_back(polygons.face_vertices.size()); };
   for (const int sheet : sheets)
     for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
-      for (const Index v : face_of(layers.surface, f)) polygons.face_vertices.push_back(layers.vertex(sheet, v));
+      for (const Index v : layers.surface.face(f)) polygons.face_vertices.push_back(layers.vertex(sheet, v));
       end_face();
     }
   const SurfaceTopology& topology = layers.topology;

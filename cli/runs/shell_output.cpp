@@ -10,6 +10,7 @@
 #include "subvol/fit/target/soup_topology.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/winding_number.h"
 
 #include <Eigen/Geometry>
@@ -144,7 +145,7 @@ std::optional<std::string> inward_warning(const TriangleMesh& surface) {
   for (std::size_t t = 0; t < n; t += step) {
     const auto& [a, b, c] = surface.triangles[t];
     const Vec3 &x = surface.positions[a], &y = surface.positions[b], &z = surface.positions[c];
-    const Vec3 normal = (y - x).cross(z - x);
+    const Vec3 normal = doubled_area_vector(surface, surface.triangles[t]);
     if (!(normal.norm() > 0)) continue;
     points.push_back((x + y + z) / 3 + kOffset * normal / std::sqrt(normal.norm()));
     areas.push_back(normal.norm());

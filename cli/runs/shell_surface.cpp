@@ -11,8 +11,7 @@
 #include "subvol/shell/shell_layers.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/region_surface.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <cmath>
@@ -60,12 +59,8 @@ double area_of(const PolygonMesh& surface, const std::vector<char>& is_in) {
   std::vector<Index> face;
   const TriangleMesh triangles = triangulate(surface, &face);
   double area = 0;
-  for (std::size_t t = 0; t < triangles.triangles.size(); ++t) {
-    if (!is_in[face[t]]) continue;
-    const auto& [a, b, c] = triangles.triangles[t];
-    const std::vector<Vec3>& x = triangles.positions;
-    area += (x[b] - x[a]).cross(x[c] - x[a]).norm() / 2;
-  }
+  for (std::size_t t = 0; t < triangles.triangles.size(); ++t)
+    if (is_in[face[t]]) area += triangle_area(triangles, triangles.triangles[t]);
   return area;
 }
 

@@ -26,6 +26,8 @@ class LongRun {
 
   /// UsageError if there is nothing to write, and as `checked_outputs`. Sets the number of threads and the memory
   /// limit.
+  void check_outputs(const std::vector<Part>& parts);
+  /// Does the same, and warns of options of scenes that have no effect.
   void prepare(const std::vector<Part>& parts);
   /// Prints the warnings that have not been printed yet.
   void tell_warnings();

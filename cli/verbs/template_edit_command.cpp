@@ -19,10 +19,10 @@
 #include "subvol/shell/extrude.h"
 #include "subvol/surface/welded_surface.h"
 #include "subvol/templates/carve.h"
+#include "subvol/templates/cell_sheet.h"
 #include "subvol/templates/cell_split.h"
 #include "subvol/templates/pillow.h"
 #include "subvol/templates/refine.h"
-#include "subvol/templates/sheet.h"
 #include "subvol/templates/vertex_merge.h"
 #include "subvol/templates/voxel_grid.h"
 

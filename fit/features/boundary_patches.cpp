@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/boundary_patches.h"
 
+#include "subvol/base/angle.h"
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -10,10 +11,8 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <string>
 
@@ -179,7 +178,7 @@ void match_lone_patches(const Votes& votes, Matching& matching) {
 }
 
 double angle_between_planes(const Vec3& n0, const Vec3& n1, const Vec3& from_0_to_1) {
-  const double turn = std::atan2(n0.cross(n1).norm(), n0.dot(n1)) * 180 / std::numbers::pi;
+  const double turn = angle_degrees_between(n0, n1);
   return from_0_to_1.dot(n0 - n1) > 0 ? 180 + turn : 180 - turn;
 }
 

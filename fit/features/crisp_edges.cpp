@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/crisp_edges.h"
 
+#include "subvol/base/angle.h"
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/format.h"
 #include "subvol/surface/triangle_geometry.h"

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/feature_curves.h"
 
+#include "subvol/base/angle.h"
 #include "subvol/base/error.h"
 #include "subvol/surface/triangle_geometry.h"
+#include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
 
@@ -19,18 +21,12 @@ using namespace internal;
 
 namespace {
 
-struct Side {
-  Index low, high, triangle;
-  bool rising;  ///< the triangle runs from low to high
-};
-
 std::array<Index, 3> sorted_corners(std::array<Index, 3> triangle) {
   std::sort(triangle.begin(), triangle.end());
   return triangle;
 }
 
 std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double angle_degrees) {
-  std::vector<Side> sides;
   std::vector<Vec3> normals;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& q = mesh.triangles[t];
@@ -38,24 +34,16 @@ std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double a
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
         throw InputError("feature_curves: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
                          " of " + std::to_string(mesh.positions.size()));
-    const Vec3& a = mesh.positions[q[0]];
-    normals.push_back((mesh.positions[q[1]] - a).cross(mesh.positions[q[2]] - a).normalized());
-    for (int i = 0; i < 3; ++i) {
-      const Index v = q[i], w = q[(i + 1) % 3];
-      if (v != w) sides.push_back({std::min(v, w), std::max(v, w), static_cast<Index>(t), v < w});
-    }
+    normals.push_back(unit_normal(mesh, static_cast<Index>(t)));
   }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
   std::vector<std::array<Index, 2>> sharp;
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
-    if (end - i != 2) continue;
-    const Vec3 left = normals[sides[i].triangle];
-    const Vec3 right = (sides[i].rising == sides[i + 1].rising ? -1.0 : 1.0) * normals[sides[i + 1].triangle];
-    if (angle_degrees_between(left, right) > angle_degrees) sharp.push_back({sides[i].low, sides[i].high});
-  }
+  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
+    const auto& [low, high, triangle, forward] = sides[0];
+    if (sides.size() != 2 || low == high) return;
+    const Vec3 left = normals[triangle];
+    const Vec3 right = (forward == sides[1].forward ? -1.0 : 1.0) * normals[sides[1].triangle];
+    if (angle_degrees_between(left, right) > angle_degrees) sharp.push_back({low, high});
+  });
   return sharp;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/angle.h"
 #include "subvol/fit/features/pads.h"
 #include "subvol/fit/features/patch_fans.h"
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
-#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 

@@ -3,9 +3,9 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/features/patch_fans.h"
+#include "subvol/mesh/validate.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/template_edit.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -109,16 +109,11 @@ class PadBuilder {
     return shortest;
   }
 
-  Vec3 unit_normal(std::span<const Index> corners) const {
-    const auto p = [&](std::size_t i) -> const Vec3& { return old_.mesh.positions[corners[i]]; };
-    return (corners.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
-  }
-
   /// Distinct normals of the padded faces at each vertex.
   std::vector<std::vector<Vec3>> distinct_normals() const {
     std::vector<std::vector<Vec3>> normals(new_vertex_.size());
     for (Index f : padded_) {
-      const Vec3 n = unit_normal(face(f));
+      const Vec3 n = normal_of_face(old_.mesh.positions, face(f));
       for (Index v : face(f))
         if (std::ranges::none_of(normals[v], [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
           normals[v].push_back(n);
@@ -266,7 +261,7 @@ std::string to_string(PadProblem problem) {
 
 PatchedMesh patched_mesh(VolumeMesh mesh, std::vector<Vec3> fitted, const FeatureRouting& routing,
                          const TriangleMesh& target) {
-  require_sound(mesh, "patched_mesh");
+  require_valid(mesh, "patched_mesh");
   mesh.tags = {};
   const MeshTopology topology(mesh);
   PatchedMesh patched;

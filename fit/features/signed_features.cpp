@@ -4,6 +4,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/surface/triangle_geometry.h"
+#include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
 
@@ -12,19 +13,11 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <tuple>
 #include <utility>
 
 namespace subvol::internal {
 
 namespace {
-
-/// One side of one triangle, with its direction.
-struct OrientedSide {
-  std::array<Index, 2> ends;  ///< the smaller number first
-  Index triangle;
-  bool rising;  ///< the triangle runs from ends[0] to ends[1]
-};
 
 void require_triangles(const TriangleMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -34,41 +27,29 @@ void require_triangles(const TriangleMesh& mesh) {
                          " of " + std::to_string(mesh.positions.size()));
 }
 
-std::vector<OrientedSide> sorted_sides(const TriangleMesh& mesh) {
-  std::vector<OrientedSide> sides;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int i = 0; i < 3; ++i) {
-      const Index v = mesh.triangles[t][i], w = mesh.triangles[t][(i + 1) % 3];
-      sides.push_back({{std::min(v, w), std::max(v, w)}, static_cast<Index>(t), v < w});
-    }
-  std::sort(sides.begin(), sides.end(), [](const OrientedSide& a, const OrientedSide& b) {
-    return std::tie(a.ends, a.triangle, a.rising) < std::tie(b.ends, b.triangle, b.rising);
-  });
-  return sides;
-}
+std::array<Index, 2> ends_of(const SurfaceHalfEdge& side) { return {side.low, side.high}; }
 
-std::span<const OrientedSide> sides_at(std::span<const OrientedSide> sides, Index v, Index w) {
+std::span<const SurfaceHalfEdge> sides_at(std::span<const SurfaceHalfEdge> sides, Index v, Index w) {
   const std::array<Index, 2> ends = {std::min(v, w), std::max(v, w)};
-  return {std::ranges::lower_bound(sides, ends, {}, &OrientedSide::ends),
-          std::ranges::upper_bound(sides, ends, {}, &OrientedSide::ends)};
+  return {std::ranges::lower_bound(sides, ends, {}, ends_of), std::ranges::upper_bound(sides, ends, {}, ends_of)};
 }
 
-double interior_angle(const TriangleMesh& mesh, std::span<const OrientedSide> pair) {
-  const OrientedSide &left = pair[0].rising ? pair[0] : pair[1], &right = pair[0].rising ? pair[1] : pair[0];
-  const Vec3 along = mesh.positions[left.ends[1]] - mesh.positions[left.ends[0]];
+double interior_angle(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> pair) {
+  const SurfaceHalfEdge &left = pair[0].forward ? pair[0] : pair[1], &right = pair[0].forward ? pair[1] : pair[0];
+  const Vec3 along = mesh.positions[left.high] - mesh.positions[left.low];
   const Vec3 n0 = unit_normal(mesh, left.triangle), n1 = unit_normal(mesh, right.triangle);
   const Vec3 axis = n0.cross(n1);
   const double turn = std::atan2(axis.norm(), n0.dot(n1)) * 180 / std::numbers::pi;
   return axis.dot(along) >= 0 ? 180 - turn : 180 + turn;
 }
 
-std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const OrientedSide> sides,
+std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides,
                                  const FeatureCurve& curve) {
   std::vector<double> angles;
   for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
     const Index v = curve.vertices[i], w = curve.vertices[i + 1];
-    const std::span<const OrientedSide> pair = sides_at(sides, v, w);
-    if (pair.size() != 2 || pair[0].rising == pair[1].rising)
+    const std::span<const SurfaceHalfEdge> pair = sides_at(sides, v, w);
+    if (pair.size() != 2 || pair[0].forward == pair[1].forward)
       throw InputError("signed_features: a curve runs along vertices " + std::to_string(v) + " and " +
                        std::to_string(w) + ", which is no edge of two consistently oriented triangles");
     angles.push_back(interior_angle(mesh, pair));
@@ -87,13 +68,13 @@ std::vector<std::array<Index, 2>> sorted_curve_edges(const FeatureCurves& curves
   return edges;
 }
 
-void find_regions(const TriangleMesh& mesh, std::span<const OrientedSide> sides, SignedFeatures& features) {
+void find_regions(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, SignedFeatures& features) {
   DisjointSets sets(mesh.triangles.size());
   const auto cuts = sorted_curve_edges(features.curves);
-  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-    if (sides[i].ends != sides[i + 1].ends || std::binary_search(cuts.begin(), cuts.end(), sides[i].ends)) continue;
-    sets.join(sides[i].triangle, sides[i + 1].triangle);
-  }
+  for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
+    if (std::binary_search(cuts.begin(), cuts.end(), ends_of(edge[0]))) return;
+    for (const SurfaceHalfEdge& side : edge) sets.join(edge[0].triangle, side.triangle);
+  });
   features.num_regions = sets.number(features.regions);
 }
 
@@ -113,7 +94,7 @@ double mean_of(const FeatureCurve& curve, std::span<const double> angles) {
 
 SignedFeatures signed_features(const TriangleMesh& target, FeatureCurves curves) {
   require_triangles(target);
-  const std::vector<OrientedSide> sides = sorted_sides(target);
+  const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(target.triangles, target.positions.size());
   SignedFeatures features;
   features.curves = std::move(curves);
   for (const FeatureCurve& curve : features.curves.curves) {

@@ -7,6 +7,8 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -83,25 +85,79 @@ void forbid(Mat3& projector, const Vec3& normal) {
   projector -= left * left.transpose() / left.squaredNorm();
 }
 
+/// The regions on either side of a face, with the sign of its area vector as seen from them.
+std::array<std::pair<Index, double>, 2> regions_of(const SheetFace& face) {
+  return {{{face.behind, 1.0}, {face.front, -1.0}}};
+}
+
+/// Returns for each vertex the directions in which it may move: not across flat faces.
+std::vector<Mat3> projectors_of(std::span<const SheetFace> faces, const VolumeMesh& mesh) {
+  std::vector<Mat3> projectors(mesh.num_vertices(), Mat3::Identity());
+  for (const SheetFace& face : faces)
+    if (const FaceGradients gradients = gradients_of(face, mesh.positions); gradients.is_flat)
+      for (std::size_t i = 0; i < face.size; ++i) forbid(projectors[face.corners[i]], gradients.area.normalized());
+  return projectors;
+}
+
+/// Gradients of the volumes of regions by vertex, of few regions at each, and the area around each vertex.
+struct VertexGradients {
+  std::vector<std::vector<std::pair<Index, Vec3>>> by_vertex;
+  std::vector<double> area;
+
+  VertexGradients(std::span<const SheetFace> faces, const VolumeMesh& mesh)
+      : by_vertex(mesh.num_vertices()), area(mesh.num_vertices(), 0.0) {
+    for (const SheetFace& face : faces) {
+      const FaceGradients gradients = gradients_of(face, mesh.positions);
+      for (std::size_t i = 0; i < face.size; ++i)
+        area[face.corners[i]] += gradients.area.norm() / static_cast<double>(face.size);
+      for (const auto& [region, sign] : regions_of(face)) {
+        if (region == kNoIndex) continue;
+        for (std::size_t i = 0; i < face.size; ++i) {
+          auto& list = by_vertex[face.corners[i]];
+          const auto at = std::ranges::find(list, region, &std::pair<Index, Vec3>::first);
+          if (at == list.end())
+            list.push_back({region, sign * gradients.of_corner[i]});
+          else
+            at->second += sign * gradients.of_corner[i];
+        }
+      }
+    }
+  }
+};
+
+/// Moves vertices so that the volumes grow by what is missing, to first order. Returns false if there is no such move.
+bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> faces, std::span<const Mat3> projectors,
+                  VolumeMesh& mesh) {
+  constexpr double kMostMove = 0.2;  // of the root of the area around a vertex
+  const auto [by_vertex, area] = VertexGradients(faces, mesh);
+  std::vector<MatrixEntry> entries;
+  for (std::size_t v = 0; v < by_vertex.size(); ++v)
+    for (const auto& [r, g] : by_vertex[v])
+      for (const auto& [s, h] : by_vertex[v]) entries.push_back({r, s, g.dot(projectors[v] * h) / area[v]});
+  const Eigen::VectorXd factors = least_norm_solution(entries, missing);
+  if (!factors.allFinite()) return false;
+  for (std::size_t v = 0; v < by_vertex.size(); ++v) {
+    if (by_vertex[v].empty()) continue;
+    Vec3 move = Vec3::Zero();
+    for (const auto& [r, g] : by_vertex[v]) move += factors[r] * g / area[v];
+    move = projectors[v] * move;
+    const double most = kMostMove * std::sqrt(area[v]);
+    mesh.positions[v] += move.norm() > most ? Vec3(most / move.norm() * move) : move;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
   constexpr int kRounds = 6;
-  constexpr double kEnough = 1e-6, kMostMove = 0.2;  // relative; of the root of the area around a vertex
+  constexpr double kEnough = 1e-6;  // relative
   const MeshTopology topology(mesh);
   const std::vector<SheetFace> faces = sheet_faces(mesh, topology);
   const auto num_regions = static_cast<Eigen::Index>(wanted.size());
   const std::vector<Vec3> before = mesh.positions;
   const QualityReport quality = measure_quality(mesh);
-  // Sides of a face count for the regions on either side.
-  const auto regions_of = [](const SheetFace& face) {
-    return std::array<std::pair<Index, double>, 2>{{{face.behind, 1.0}, {face.front, -1.0}}};
-  };
-  std::vector<Mat3> projectors(mesh.num_vertices(), Mat3::Identity());
-  for (const SheetFace& face : faces)
-    if (const FaceGradients gradients = gradients_of(face, mesh.positions); gradients.is_flat)
-      for (std::size_t i = 0; i < face.size; ++i) forbid(projectors[face.corners[i]], gradients.area.normalized());
-
+  const std::vector<Mat3> projectors = projectors_of(faces, mesh);
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<double> now = region_volumes(mesh);
     Eigen::VectorXd missing(num_regions);
@@ -110,40 +166,7 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
       missing[r] = wanted[static_cast<std::size_t>(r)] - now[static_cast<std::size_t>(r)];
       worst = std::max(worst, std::abs(missing[r]) / wanted[static_cast<std::size_t>(r)]);
     }
-    if (worst < kEnough) break;
-    std::vector<FaceGradients> gradients;
-    std::vector<double> area(mesh.num_vertices(), 0.0);
-    for (const SheetFace& face : faces) {
-      gradients.push_back(gradients_of(face, mesh.positions));
-      for (std::size_t i = 0; i < face.size; ++i)
-        area[face.corners[i]] += gradients.back().area.norm() / static_cast<double>(face.size);
-    }
-    // Gradients by vertex and region, few regions at each vertex.
-    std::vector<std::vector<std::pair<Index, Vec3>>> by_vertex(mesh.num_vertices());
-    for (std::size_t f = 0; f < faces.size(); ++f)
-      for (const auto& [region, sign] : regions_of(faces[f])) {
-        if (region == kNoIndex) continue;
-        for (std::size_t i = 0; i < faces[f].size; ++i) {
-          auto& list = by_vertex[faces[f].corners[i]];
-          const auto at = std::ranges::find(list, region, &std::pair<Index, Vec3>::first);
-          if (at == list.end()) list.push_back({region, sign * gradients[f].of_corner[i]});
-          else at->second += sign * gradients[f].of_corner[i];
-        }
-      }
-    std::vector<MatrixEntry> entries;
-    for (std::size_t v = 0; v < by_vertex.size(); ++v)
-      for (const auto& [r, g] : by_vertex[v])
-        for (const auto& [s, h] : by_vertex[v]) entries.push_back({r, s, g.dot(projectors[v] * h) / area[v]});
-    const Eigen::VectorXd factors = least_norm_solution(entries, missing);
-    if (!factors.allFinite()) break;
-    for (std::size_t v = 0; v < by_vertex.size(); ++v) {
-      if (by_vertex[v].empty()) continue;
-      Vec3 move = Vec3::Zero();
-      for (const auto& [r, g] : by_vertex[v]) move += factors[r] * g / area[v];
-      move = projectors[v] * move;
-      const double most = kMostMove * std::sqrt(area[v]);
-      mesh.positions[v] += move.norm() > most ? Vec3(most / move.norm() * move) : move;
-    }
+    if (worst < kEnough || !move_towards(missing, faces, projectors, mesh)) break;
   }
   const QualityReport after = measure_quality(mesh);
   bool good = after.certificate.not_certified.size() <= quality.certificate.not_certified.size();

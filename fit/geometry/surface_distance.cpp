@@ -3,8 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <array>
@@ -17,6 +16,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 struct OneSided {
@@ -24,11 +25,6 @@ struct OneSided {
   SurfaceDistance::Extreme max;
   bool is_set = false;  ///< false: there is no distance yet
 };
-
-double area_of(const TriangleMesh& mesh, Index t) {
-  const auto& [a, b, c] = mesh.triangles[t];
-  return 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
-}
 
 /// Where a surface is sampled. Triangles are named by their places in an order in which neighbors are close in space.
 struct Samples {
@@ -57,10 +53,7 @@ int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::
   constexpr double kMost = 1000;
   if (at_edge.size() == 1 && !all_known) return 1;
   const auto corners = [&](const Keyed& side) { return mesh.triangles[order[side.edge.place]]; };
-  const auto normal = [&](const Keyed& side) -> Vec3 {
-    const auto [a, b, c] = corners(side);
-    return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
-  };
+  const auto normal = [&](const Keyed& side) { return unit_normal(mesh, order[side.edge.place]); };
   const auto is_forward = [&](const Keyed& side) {
     const int k = side.edge.corner;
     return corners(side)[k] < corners(side)[(k + 1) % 3];
@@ -115,7 +108,8 @@ Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const
   constexpr double kLeastShare = 0.125;
   Samples samples;
   std::vector<double> areas(order.size());
-  for (std::size_t place = 0; place < order.size(); ++place) samples.area += areas[place] = area_of(mesh, order[place]);
+  for (std::size_t place = 0; place < order.size(); ++place)
+    samples.area += areas[place] = triangle_area(mesh, mesh.triangles[order[place]]);
   const bool is_dense = order.size() > kDense * static_cast<std::size_t>(options.num_samples);
   std::vector<double> of_vertex(mesh.positions.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
@@ -199,7 +193,8 @@ OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const
       order.size(), to,
       [&](Sampler& sampler, std::size_t place) {
         if (samples.cuts[place] == 0) return;
-        sampler.add_triangle(corners(static_cast<Index>(place)), area_of(from, order[place]), samples.cuts[place]);
+        sampler.add_triangle(corners(static_cast<Index>(place)), triangle_area(from, from.triangles[order[place]]),
+                             samples.cuts[place]);
       },
       result);
   sample(

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/geometry/thinnest_place.h"
 
+#include "subvol/surface/triangle_geometry.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -61,7 +63,7 @@ class Balls {
   /// Returns the place where the ball at a sample touches the surface again, if it is narrower than `most`; width 0:
   /// there is none that counts.
   ThinPlace place(const Sample& sample, double most) const {
-    const Vec3 front = normal(sample.triangle);
+    const Vec3 front = unit_normal(mesh_, sample.triangle);
     if (!front.allFinite() || front.isZero()) return {};
     const Vec3 inward = side_ == ThinSide::wall ? Vec3(-front) : front;
     // The line across is within 30 degrees of the normal: the ball is no larger than the width over the root of 3.
@@ -88,16 +90,11 @@ class Balls {
     }
     return found.triangles[1] != kNoIndex;
   }
-  Vec3 normal(Index triangle) const {
-    const auto& t = mesh_.triangles[triangle];
-    const Vec3& a = mesh_.positions[t[0]];
-    return (mesh_.positions[t[1]] - a).cross(mesh_.positions[t[2]] - a).normalized();
-  }
   bool faces(const ThinPlace& place, const Vec3& inward) const {
     for (Index v : mesh_.triangles[place.triangles[0]])
       for (Index w : mesh_.triangles[place.triangles[1]])
         if (v == w) return false;
-    const double opposite = normal(place.triangles[0]).dot(normal(place.triangles[1]));
+    const double opposite = unit_normal(mesh_, place.triangles[0]).dot(unit_normal(mesh_, place.triangles[1]));
     return opposite <= kMostCosine && inward.dot(place.across - place.at) >= kLeastCosine * place.width;
   }
 

@@ -27,21 +27,16 @@ std::string list_of(std::size_t count, const TextOf& text_of) {
   return text;
 }
 
-std::span<const Index> corners_of(const PolygonMesh& surface, Index face) {
-  const std::size_t begin = surface.face_offsets[face];
-  return {surface.face_vertices.data() + begin, surface.face_offsets[face + 1] - begin};
-}
-
 Vec3 center_of(const PolygonMesh& surface, Index face) {
   Vec3 sum = Vec3::Zero();
-  const auto corners = corners_of(surface, face);
+  const auto corners = surface.face(face);
   for (const Index v : corners) sum += surface.positions[v];
   return sum / static_cast<double>(corners.size());
 }
 
 /// Returns a place that two faces have in common; of quads, near both.
 Vec3 meeting_place(const PolygonMesh& surface, const std::array<Index, 2>& faces) {
-  const auto a = corners_of(surface, faces[0]), b = corners_of(surface, faces[1]);
+  const auto a = surface.face(faces[0]), b = surface.face(faces[1]);
   if (a.size() != 3 || b.size() != 3 || faces[0] == faces[1])
     return (center_of(surface, faces[0]) + center_of(surface, faces[1])) / 2;
   const auto triangle = [&](std::span<const Index> corners) {

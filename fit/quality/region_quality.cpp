@@ -8,6 +8,7 @@
 #include "subvol/fit/elements/shape_functions.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -253,11 +254,9 @@ RegionReport measure_regions(const RegionSurface& surface) {
   RegionReport report;
   std::map<std::array<int, 2>, InterfaceArea> areas;
   for (std::size_t t = 0; t < surface.sides.size(); ++t) {
-    const auto& [a, b, c] = surface.mesh.triangles[t];
-    const std::vector<Vec3>& x = surface.mesh.positions;
     InterfaceArea& one = areas[surface.pair(t)];
     ++one.num_faces;
-    one.area += 0.5 * (x[b] - x[a]).cross(x[c] - x[a]).norm();
+    one.area += triangle_area(surface.mesh, surface.mesh.triangles[t]);
   }
   for (std::size_t r = 0; r < surface.regions.size(); ++r) {
     RegionQuality region{surface.regions[r].number, surface.regions[r].name};

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/solver/levenberg_marquardt.h"
 
-#include "subvol/base/format.h"
-#include "subvol/fit/solver/anderson.h"
-#include "subvol/fit/solver/reduced_hessian.h"
+#include "subvol/fit/solver/minimizer_run.h"
 #include "subvol/fit/solver/vector_math.h"
 
 #include <algorithm>
@@ -12,7 +10,6 @@
 #include <cstdint>
 #include <functional>
 #include <numeric>
-#include <string>
 #include <utility>
 
 namespace subvol::internal {
@@ -44,7 +41,7 @@ std::vector<Index> most_risen(std::span<const double> before, std::span<const do
 }
 
 /// One minimization by the Levenberg-Marquardt method.
-class LevenbergMarquardtRun {
+class LevenbergMarquardtRun : MinimizerRun {
  public:
   LevenbergMarquardtRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
   MinimizerResult run();
@@ -63,41 +60,18 @@ class LevenbergMarquardtRun {
   bool shorten_until_downhill();
   /// Raises the damping where d_ was shortened, and lowers it elsewhere.
   void damp_where_shortened();
-  /// Takes the step that was found.
-  void take_step(IterationRecord& record);
-  /// Takes the step that follows from the last ones by Anderson acceleration instead, if it ruins no cell and E, with
-  /// correspondences found anew, is not above that of the step that was found. Returns false if it does not.
-  bool take_accelerated_step(IterationRecord& record);
-  bool is_done(const IterationRecord& record);
+  bool admits_step(IterationRecord& record) override;
 
-  FitProblem& problem_;
-  std::vector<Vec3>& x_;
-  const MinimizerOptions& options_;
-  MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
   double damping_ = 0;
   std::vector<double> local_damping_;    // what mu is multiplied by at each degree of freedom
   std::vector<std::uint8_t> shortened_;  // not zero for the degrees of freedom at which d_ was shortened
-  std::vector<Vec3> y_, z_, d_, dy_, dz_, y_trial_, z_trial_;
-  std::vector<Mat3> inverse_diagonal_;
-  Linearization linearized_;
-  AndersonMemory memory_;
-  std::vector<Vec3> step_;
-  bool is_assigned_ = false;  // true if the surface term's correspondences are those of z_
-  std::vector<Index> uncertified_, trial_uncertified_;  // at y_ and at y_trial_
-  std::vector<double> trial_cells_;  // energy of each cell at y_trial_
-  double energy_ = 0, trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
+  std::vector<double> trial_cells_;      // energy of each cell at y_trial_
 };
 
 LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
-    : problem_(problem), x_(x), options_(options) {
-  if (options.begun) result_ = *options.begun;
-  result_.stop = MinimizerStop::iteration_limit;
+    : MinimizerRun(problem, x, options) {
   damping_ = damping_after(options.first_damping, result_.iterations);
-  for (auto* nodes : {&y_, &dy_, &y_trial_}) nodes->resize(problem.nodes.num_rows());
-  for (auto* samples : {&z_, &dz_, &z_trial_}) samples->resize(problem.samples.num_rows());
   local_damping_.assign(x.size(), 1);
-  problem.apply_nodes(x, y_);
-  problem.apply_samples(x, z_);
   uncertified_ = problem.volume->uncertified(y_);
 }
 
@@ -204,77 +178,18 @@ bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
   return false;
 }
 
-void LevenbergMarquardtRun::take_step(IterationRecord& record) {
-  add_scaled(1, d_, x_);
-  problem_.apply_nodes(x_, y_);
-  problem_.apply_samples(x_, z_);
-  uncertified_ = std::move(trial_uncertified_);
-  record.surface_energy = trial_surface_;
-  record.volume_energy = trial_volume_;
-}
-
-bool LevenbergMarquardtRun::take_accelerated_step(IterationRecord& record) {
-  if (!options_.accelerates || !problem_.surface) return false;
-  memory_.add(x_, d_, linearized_.gradient());
-  if (!memory_.find_step(step_)) return false;
-  const auto accept = [&] {
-    problem_.nodes.apply(step_, dy_);
-    if (options_.longest_move > 0)
-      for (const Vec3& d : dy_)
-        if (d.norm() > options_.longest_move) return false;
-    add_scaled(1, x_, step_);
-    problem_.apply_nodes(step_, y_trial_);
-    const double volume = problem_.volume->value(y_trial_);
-    if (!(problem_.lambda * volume <= trial_)) return false;
-    if (!problem_.volume->ruined(y_, y_trial_).empty()) return false;
-    std::vector<Index> uncertified = problem_.volume->uncertified(y_trial_);
-    if (!newly_failed(uncertified_, uncertified).empty()) return false;
-    problem_.apply_samples(step_, z_trial_);
-    problem_.surface->assign(z_trial_);
-    const double surface = problem_.surface->value(z_trial_), energy = surface + problem_.lambda * volume;
-    if (!(energy <= trial_)) return false;
-    trial_ = energy;
-    record.surface_energy = surface;
-    record.volume_energy = volume;
-    uncertified_ = std::move(uncertified);
-    return true;
-  };
-  if (!accept()) {
-    memory_.clear();
-    return false;
-  }
-  std::swap(x_, step_);
-  std::swap(y_, y_trial_);
-  std::swap(z_, z_trial_);
-  return is_assigned_ = true;
-}
-
-bool LevenbergMarquardtRun::is_done(const IterationRecord& record) {
-  if (!record_step(record, options_, result_)) return true;
-  const double decrease = (energy_ - trial_) / energy_;
-  result_.small_steps = decrease < options_.relative_decrease ? result_.small_steps + 1 : 0;
-  if (result_.small_steps < 2) return false;
-  result_.stop = MinimizerStop::converged;
-  result_.explanation = formatted("relative decrease of the energy %.2g in two steps running", decrease);
-  return true;
+bool LevenbergMarquardtRun::admits_step(IterationRecord&) {
+  const auto is_long = [&](const Vec3& d) { return d.norm() > options_.longest_move; };
+  if (options_.longest_move > 0 && std::ranges::any_of(dy_, is_long)) return false;
+  return problem_.volume->ruined(y_, y_trial_).empty();
 }
 
 MinimizerResult LevenbergMarquardtRun::run() {
   constexpr int kStepsBetweenStates = 8;
-  const auto end = [&](MinimizerStop why, std::string explanation) {
-    result_.stop = why;
-    result_.explanation = std::move(explanation);
-    return std::move(result_);
-  };
   for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
     if (iteration > 0 && iteration % kStepsBetweenStates == 0) {
-      // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
-      if (problem_.surface) problem_.surface->forget();
-      is_assigned_ = false;
-      memory_.clear();
       local_damping_.assign(x_.size(), 1);
-      uncertified_ = problem_.volume->uncertified(y_);
-      if (options_.keep) options_.keep(x_, result_);
+      restart();
     }
     energy_ = linearized_.linearize(problem_, y_, z_, false, is_assigned_);
     is_assigned_ = false;
@@ -287,8 +202,7 @@ MinimizerResult LevenbergMarquardtRun::run() {
     }
     if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kLess * damping_);
     damp_where_shortened();
-    if (!take_accelerated_step(record)) take_step(record);
-    record.step_length = 1;
+    if (!take_accelerated_step(1, record)) take_step(1, record);
     if (is_done(record)) return std::move(result_);
   }
   return end(MinimizerStop::iteration_limit, "iteration limit");

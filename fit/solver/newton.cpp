@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/solver/newton.h"
 
-#include "subvol/base/format.h"
-#include "subvol/fit/solver/anderson.h"
-#include "subvol/fit/solver/reduced_hessian.h"
+#include "subvol/fit/solver/minimizer_run.h"
 #include "subvol/fit/solver/vector_math.h"
 
-#include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 namespace subvol::internal {
@@ -23,7 +19,7 @@ constexpr int kRestartPeriod = 8;
 constexpr double kLevel = 1e-26;
 
 /// One minimization by Newton's method.
-class NewtonRun {
+class NewtonRun : MinimizerRun {
  public:
   NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
   MinimizerResult run();
@@ -46,47 +42,16 @@ class NewtonRun {
   /// Finds the longest of t, t / 2, ... that decreases E and leaves no further cell uncertified. If cells were
   /// uncertified at a longer one, it is halved once more (`VolumeTerm::keeps_off_inversion`).
   Search search_line(bool may_stiffen, IterationRecord& record);
-  /// Takes the step that was found.
-  void take_step(IterationRecord& record);
-  /// Takes the step that follows from the last ones by Anderson acceleration instead, if no cell stands in its way and
-  /// E, with correspondences found anew, is not above that of the step that was found. Returns false if it does not.
-  bool take_accelerated_step(IterationRecord& record);
-  /// Records the step. Returns true if E has stopped decreasing or the caller wants to stop.
-  bool is_done(const IterationRecord& record);
-  void stop(MinimizerStop why, std::string explanation) {
-    result_.stop = why;
-    result_.explanation = std::move(explanation);
-  }
+  bool admits_step(IterationRecord& record) override;
 
-  FitProblem& problem_;
-  std::vector<Vec3>& x_;
-  const MinimizerOptions& options_;
-  MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
-  std::vector<Vec3> y_, z_;  // nodes and samples at x
-  Linearization linearized_;
-  AndersonMemory memory_;
-  std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_, step_;
-  bool is_assigned_ = false;  // true if the surface term's correspondences are those of z_
-  std::vector<Mat3> inverse_diagonal_;
-  std::vector<Index> uncertified_;  // at x, up to rounding
-  double energy_ = 0, slope_ = 0, t_ = 0;
-  double trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
-  std::vector<Index> trial_uncertified_;
+  double slope_ = 0, t_ = 0;     // along d_, and the share of d_ that is taken
   std::vector<Index> blocking_;  // cells that blocked this step
   bool is_stiffened_ = false;    // true if the Hessian was made stiffer for this step
 };
 
 NewtonRun::NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
-    : problem_(problem), x_(x), options_(options) {
-  if (options.begun) result_ = *options.begun;
-  result_.stop = MinimizerStop::iteration_limit;
+    : MinimizerRun(problem, x, options) {
   densify_again(problem, result_);
-  y_.resize(problem.nodes.num_rows());
-  z_.resize(problem.samples.num_rows());
-  problem.apply_nodes(x, y_);
-  problem.apply_samples(x, z_);
-  for (auto* nodes : {&dy_, &y_trial_}) nodes->resize(y_.size());
-  for (auto* samples : {&dz_, &z_trial_}) samples->resize(z_.size());
   uncertified_ = problem.volume->uncertified(y_);
 }
 
@@ -156,78 +121,18 @@ NewtonRun::Search NewtonRun::search_line(bool may_stiffen, IterationRecord& reco
   return Search::no_step;
 }
 
-void NewtonRun::take_step(IterationRecord& record) {
-  add_scaled(t_, d_, x_);
-  problem_.apply_nodes(x_, y_);
-  problem_.apply_samples(x_, z_);
-  uncertified_ = std::move(trial_uncertified_);
-  record.surface_energy = trial_surface_;
-  record.volume_energy = trial_volume_;
-  record.step_length = t_;
-}
-
-bool NewtonRun::take_accelerated_step(IterationRecord& record) {
-  if (!options_.accelerates || !problem_.surface) return false;
-  step_.assign(d_.size(), Vec3::Zero());
-  add_scaled(t_, d_, step_);
-  memory_.add(x_, step_, linearized_.gradient());
-  const auto accept = [&] {
-    problem_.nodes.apply(step_, dy_);
-    if (problem_.volume->max_step(y_, dy_) < 1) return false;
-    add_scaled(1, x_, step_);
-    problem_.apply_nodes(step_, y_trial_);
-    const double volume = problem_.volume->value(y_trial_);
-    if (!(problem_.lambda * volume <= trial_)) return false;
-    std::vector<Index> uncertified = problem_.volume->uncertified(y_trial_);
-    if (!newly_failed(uncertified_, uncertified).empty()) return false;
-    problem_.apply_samples(step_, z_trial_);
-    problem_.surface->assign(z_trial_);
-    const double surface = problem_.surface->value(z_trial_), energy = surface + problem_.lambda * volume;
-    if (!(energy <= trial_)) return false;
-    trial_ = energy;
-    record.surface_energy = surface;
-    record.volume_energy = volume;
-    uncertified_ = std::move(uncertified);
-    return true;
-  };
-  if (!memory_.find_step(step_)) return false;
+bool NewtonRun::admits_step(IterationRecord& record) {
   ++record.evaluations;
-  if (!accept()) {
-    memory_.clear();
-    return false;
-  }
-  record.step_length = 1;
-  std::swap(x_, step_);
-  std::swap(y_, y_trial_);
-  std::swap(z_, z_trial_);
-  return is_assigned_ = true;
-}
-
-bool NewtonRun::is_done(const IterationRecord& record) {
-  if (!record_step(record, options_, result_)) return true;
-  const double decrease = (energy_ - trial_) / energy_;
-  result_.small_steps = decrease < options_.relative_decrease ? result_.small_steps + 1 : 0;
-  if (result_.small_steps < 2) return false;
-  stop(MinimizerStop::converged, formatted("relative decrease of the energy %.2g in two steps running", decrease));
-  return true;
+  return problem_.volume->max_step(y_, dy_) >= 1;
 }
 
 MinimizerResult NewtonRun::run() {
   bool is_refined = false;  // the quadrature of cells, since the Hessian was computed
-  const auto end = [&](MinimizerStop why, std::string explanation) {
-    stop(why, std::move(explanation));
-    return std::move(result_);
-  };
   for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
-    // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
     const bool restarts = iteration % kRestartPeriod == 0;
     if (iteration > 0 && restarts) {
-      if (problem_.surface) problem_.surface->forget();
-      is_assigned_ = false;
-      memory_.clear();
       inverse_diagonal_.clear();
-      uncertified_ = problem_.volume->uncertified(y_);
-      if (options_.keep) options_.keep(x_, result_);
+      restart();
     }
     const bool is_old = iteration < 2 || restarts || iteration % options_.hessian_life == 0 || is_stiffened_ ||
                         is_refined || t_ < kShortStep;
@@ -252,7 +157,7 @@ MinimizerResult NewtonRun::run() {
     }
     if (found == Search::no_step)
       return end(MinimizerStop::no_step, "no step along the search direction decreases the energy");
-    if (is_refined || !take_accelerated_step(record)) take_step(record);
+    if (is_refined || !take_accelerated_step(t_, record)) take_step(t_, record);
     if (is_done(record)) return std::move(result_);
   }
   return end(MinimizerStop::iteration_limit, "iteration limit");

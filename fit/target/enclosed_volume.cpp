@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/enclosed_volume.h"
 
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <cmath>
@@ -72,8 +72,7 @@ double signed_volume(std::span<const Vec3> positions, std::span<const std::array
   if (triangles.empty()) return 0;
   const Vec3& origin = positions[triangles[0][0]];
   double sum = 0;
-  for (const auto& t : triangles)
-    sum += (positions[t[0]] - origin).dot((positions[t[1]] - origin).cross(positions[t[2]] - origin));
+  for (const auto& t : triangles) sum += sixfold_volume(positions, t, origin);
   return std::abs(sum) / 6;
 }
 

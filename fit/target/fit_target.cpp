@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/fit_target.h"
 
-#include "subvol/base/error.h"
-#include "subvol/base/format.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/sheets.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -30,50 +29,14 @@ PointCloud normalized(const PointCloud& cloud, const Normalization& normalizatio
 
 }  // namespace
 
-Normalization::Normalization(const TriangleMesh& target) {
-  center = TargetSurface::center_of(target);
-  diagonal = bounding_box_diagonal(target);
-  if (!(diagonal > 0) || !std::isfinite(diagonal))
-    throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
-}
-
-Normalization::Normalization(const PointCloud& target) {
-  const TargetSurface surface(target);
-  center = surface.center();
-  diagonal = surface.diagonal();
-}
-
-std::vector<Vec3> Normalization::to_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = (p - center) / diagonal;
-  return points;
-}
-
-void Normalization::take_in(VolumeMesh& mesh) const {
-  // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of cells.
-  constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
-  mesh.positions = to_unit(std::move(mesh.positions));
-  Eigen::AlignedBox3d box;
-  for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
-  if (box.isEmpty()) return;
-  const double size = box.diagonal().stableNorm();
-  if (!(size >= kLeastSize && size <= kMostSize))
-    throw InputError(formatted("the mesh is %.2g times as large as the target; expected one roughly in place", size));
-  const double distance = box.center().stableNorm();
-  if (!(distance <= kMostSize))
-    throw InputError(formatted(
-        "the mesh is %.2g times the target's diagonal away from it; expected one roughly in place", distance));
-}
-
-std::vector<Vec3> Normalization::from_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = center + diagonal * p;
-  return points;
-}
-
 FitTarget::FitTarget(const TriangleMesh& target)
-    : normalization(target), mesh(normalized(joined_at_open_edges(target), normalization)), tree(mesh), surface(mesh) {}
+    : normalization(normalization_of(target)),
+      mesh(normalized(joined_at_open_edges(target), normalization)),
+      tree(mesh),
+      surface(mesh) {}
 
 FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
-    : normalization(target), surface(normalized(target, normalization), weights) {}
+    : normalization(normalization_of(target)), surface(normalized(target, normalization), weights) {}
 
 void FitTarget::keep_interfaces(const VolumeMesh& start) {
   if (surface.is_cloud() || has_interfaces()) return;
@@ -124,8 +87,7 @@ void FitTarget::add_interfaces() {
   all.positions.insert(all.positions.end(), interfaces.positions.begin(), interfaces.positions.end());
   for (std::size_t t = 0; t < interfaces.triangles.size(); ++t) {
     const auto& [a, b, c] = interfaces.triangles[t];
-    const std::vector<Vec3>& x = interfaces.positions;
-    if (!((x[b] - x[a]).cross(x[c] - x[a]).norm() > 0)) continue;
+    if (!(doubled_area_vector(interfaces, interfaces.triangles[t]).norm() > 0)) continue;
     all.triangles.push_back({first + a, first + b, first + c});
     group_of_triangle.push_back(group_of_interface_triangle[t]);
   }

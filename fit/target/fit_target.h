@@ -3,6 +3,7 @@
 
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/target/normalization.h"
 #include "subvol/fit/target/target_report.h"
 #include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -16,22 +17,6 @@
 #include <vector>
 
 namespace subvol::internal {
-
-/// Centered coordinates in which the target's bounding box has the diagonal 1, so that results do not depend on the
-/// origin or the unit.
-struct Normalization {
-  Vec3 center = Vec3::Zero();
-  double diagonal = 1;
-
-  /// InputError: a target without extent, or with coordinates that are not finite.
-  explicit Normalization(const TriangleMesh& target);
-  explicit Normalization(const PointCloud& target);
-  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
-  /// Transforms a mesh to these coordinates. InputError: the mesh is more than 1e6 times smaller or larger than the
-  /// target, or more than 1e6 diagonals away from it.
-  void take_in(VolumeMesh& mesh) const;
-  std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
-};
 
 /// Approximate least number of samples of a target.
 inline constexpr std::size_t kLeastTargetSamples = 20000;
@@ -53,7 +38,7 @@ struct FitTarget {
   std::vector<Index> region_triangle;
   std::vector<double> region_volumes;  ///< `RegionSurface::volumes` in normalized coordinates
 
-  /// InputError: as for `Normalization`.
+  /// InputError: as for `normalization_of`.
   /// Vertices of the target's open edges in the same place count as one (`joined_at_open_edges`).
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);

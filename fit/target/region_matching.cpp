@@ -5,9 +5,8 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/winding_number.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -51,9 +50,8 @@ bool has_cavity(const VolumeMesh& mesh) {
     parts.join(t[0], t[2]);
   }
   std::map<Index, double> volumes;
-  const auto from_first = [&](Index v) { return Vec3(boundary.positions[v] - boundary.positions.front()); };
   for (const auto& t : boundary.triangles)
-    volumes[parts.of(t[0])] += from_first(t[0]).dot(from_first(t[1]).cross(from_first(t[2])));
+    volumes[parts.of(t[0])] += sixfold_volume(boundary.positions, t, boundary.positions.front());
   return std::ranges::any_of(volumes, [](const auto& part) { return part.second < 0; });
 }
 

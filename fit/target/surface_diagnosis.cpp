@@ -10,6 +10,7 @@
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/rim_loops.h"
 #include "subvol/surface/surface_parts.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -236,15 +237,11 @@ void Diagnostician::find_meetings() {
 
 void Diagnostician::find_sharp_angles() {
   const double least_cosine = std::cos((180 - kSharpDegrees) * std::numbers::pi / 180);
-  const auto normal = [&](Index t) -> Vec3 {
-    const Corners p = corners(t);
-    return (p[1] - p[0]).cross(p[2] - p[0]).normalized();
-  };
   std::vector<SurfacePlace> places;
   for (const auto& [i, j] : parts_.joined) {
     const SurfaceHalfEdge &a = parts_.sides[i], &b = parts_.sides[j];
     if (a.forward == b.forward || repeated_[a.triangle] || repeated_[b.triangle]) continue;
-    const double cosine = normal(a.triangle).dot(normal(b.triangle));
+    const double cosine = unit_normal(mesh_, a.triangle).dot(unit_normal(mesh_, b.triangle));
     if (!(cosine < least_cosine)) continue;
     places.push_back(edge_place(a, b.triangle));
     places.back().measure = 180 - std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;

@@ -10,8 +10,7 @@
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/surface_parts.h"
-
-#include <Eigen/Geometry>
+#include "subvol/surface/triangle_geometry.h"
 
 #include <algorithm>
 #include <cmath>
@@ -120,8 +119,7 @@ void TargetSurface::take_triangles(const TriangleMesh& mesh) {
         throw InputError("target: triangle " + std::to_string(t) + " has a corner outside [0, number of positions)");
       if (!mesh.positions[v].allFinite()) throw InputError("target: position " + std::to_string(v) + " is not finite");
     }
-    const Vec3 &a = positions_[corners[0]], &b = positions_[corners[1]], &c = positions_[corners[2]];
-    const Vec3 normal = (b - a).cross(c - a);
+    const Vec3 normal = doubled_area_vector(mesh, corners);
     const double length = normal.norm();
     if (!std::isfinite(length)) throw InputError("target: triangle " + std::to_string(t) + " is too large");
     if (!(length > 0)) continue;
@@ -129,9 +127,9 @@ void TargetSurface::take_triangles(const TriangleMesh& mesh) {
     normals_.push_back(normal / length);
     areas_.push_back(0.5 * length);
     area_ += 0.5 * length;
-    for (const Vec3* p : {&a, &b, &c}) {
-      low = low.cwiseMin(*p);
-      high = high.cwiseMax(*p);
+    for (const Index v : corners) {
+      low = low.cwiseMin(positions_[v]);
+      high = high.cwiseMax(positions_[v]);
     }
   }
   if (triangles_.empty()) throw InputError("target: no triangle has an area");

@@ -100,6 +100,7 @@ struct WrittenBlock {
 
 constexpr std::size_t kLongestName = 255;   // that readers take
 constexpr std::size_t kLongestSuffix = 20;  // of a kind of cell or a number
+constexpr std::size_t kStringLength = 33;   // of the names of axes, with the zero at the end
 
 /// Cuts a name to so many bytes, not within a character.
 std::string exodus_name(std::string name, std::size_t longest = kLongestName) {
@@ -153,151 +154,222 @@ std::vector<char> table_of(const std::vector<std::string>& names, std::size_t le
   return table;
 }
 
-std::string bytes_of(const NodalMesh& mesh) {
-  const int order = common_order(mesh, "Exodus", 2);
-  const bool edges_only = order == 2 && has_edge_nodes_only(mesh);
-  // Nodes that no element has are left out, but for vertices.
-  std::vector<bool> used(mesh.positions.size(), true);
-  if (edges_only) used = edge_nodes(mesh, order);
-  std::vector<Index> number(mesh.positions.size(), kNoIndex);
-  std::vector<double> coordinates[3];
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    if (!used[v]) continue;
-    number[v] = static_cast<Index>(coordinates[0].size());
-    for (int k = 0; k < 3; ++k) coordinates[k].push_back(mesh.positions[v][k]);
-  }
-  const auto one_based = [&](Index node) { return number[static_cast<std::size_t>(node)] + 1; };
-  const std::vector<WrittenBlock> blocks = blocks_of(mesh);
-  const auto num_nodes = [&](CellKind kind) {
-    return edges_only ? num_edge_nodes(kind, 2) : num_lattice_points(kind, order);
-  };
-  std::vector<int> element(mesh.num_cells());  // number of each cell
-  int next = 0;
-  for (const WrittenBlock& block : blocks)
-    for (const std::size_t c : block.cells) element[c] = ++next;
+/// The side sets and node sets of a file, one of each for a group that has faces.
+struct WrittenSets {
+  std::vector<GroupSides> groups;
+  std::vector<int> ids;
+  std::vector<std::string> names;
+};
 
-  std::vector<GroupSides> sides = sides_of_groups(mesh, exodus_faces, !edges_only);
-  std::vector<int> group_numbers;
-  for (const Group& group : mesh.face_groups.groups) group_numbers.push_back(group.number);
-  PositiveNumbers positive(group_numbers);
-  std::vector<int> set_ids;
-  std::vector<std::string> set_names, block_names;
-  std::vector<const GroupSides*> sets;
+WrittenSets sets_of(const NodalMesh& mesh, bool with_centers) {
+  std::vector<GroupSides> sides = sides_of_groups(mesh, exodus_faces, with_centers);
+  std::vector<int> numbers;
+  for (const Group& group : mesh.face_groups.groups) numbers.push_back(group.number);
+  PositiveNumbers positive(numbers);
+  WrittenSets sets;
   for (std::size_t g = 0; g < sides.size(); ++g) {
     if (sides[g].sides.empty()) continue;
-    sets.push_back(&sides[g]);
-    set_ids.push_back(positive.of(group_numbers[g]));
-    set_names.push_back(exodus_name(mesh.face_groups.groups[g].name));
+    sets.groups.push_back(std::move(sides[g]));
+    sets.ids.push_back(positive.of(numbers[g]));
+    sets.names.push_back(exodus_name(mesh.face_groups.groups[g].name));
   }
-  std::vector<int> block_ids;
-  for (const WrittenBlock& block : blocks) {
-    block_ids.push_back(block.id);
-    block_names.push_back(block.name);
-  }
-  std::size_t longest = 32;  // of names; older readers expect at least so many
-  for (const auto* names : {&set_names, &block_names})
-    for (const std::string& name : *names) longest = std::max(longest, name.size());
+  return sets;
+}
 
-  ExodusWriter file;
-  constexpr float kVersion = 5.1f;
-  file.attribute("api_version", kVersion);
-  file.attribute("version", kVersion);
-  file.attribute("floating_point_word_size", 8);
-  file.attribute("file_size", 1);
-  file.attribute("maximum_name_length", static_cast<int>(longest));
-  file.attribute(NC_GLOBAL, "title", "subvol volume mesh");
-  const int len_string = file.dimension("len_string", 33), len_name = file.dimension("len_name", longest + 1);
-  file.dimension("len_line", 81);
-  file.dimension("four", 4);
-  const int time_step = file.dimension("time_step", NC_UNLIMITED);
-  const int num_dim = file.dimension("num_dim", 3), nodes = file.dimension("num_nodes", coordinates[0].size());
-  file.dimension("num_elem", mesh.num_cells());
-  const int num_blocks = file.dimension("num_el_blk", blocks.size());
-  file.variable("time_whole", NC_DOUBLE, {time_step});
-  const int coor_names = file.variable("coor_names", NC_CHAR, {num_dim, len_string});
-  int coordinate_variables[3];
-  constexpr const char* kCoordinates[] = {"coordx", "coordy", "coordz"};
-  for (int k = 0; k < 3; ++k) coordinate_variables[k] = file.variable(kCoordinates[k], NC_DOUBLE, {nodes});
-  const int eb_status = file.variable("eb_status", NC_INT, {num_blocks});
-  const int eb_prop = file.variable("eb_prop1", NC_INT, {num_blocks});
-  file.attribute(eb_prop, "name", "ID");
-  const int eb_names = file.variable("eb_names", NC_CHAR, {num_blocks, len_name});
-  std::vector<int> connects;
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const std::string suffix = std::to_string(b + 1);
-    const int elements = file.dimension("num_el_in_blk" + suffix, blocks[b].cells.size());
-    const int of_element = file.dimension("num_nod_per_el" + suffix, num_nodes(blocks[b].kind));
-    connects.push_back(file.variable("connect" + suffix, NC_INT, {elements, of_element}));
-    file.attribute(connects.back(), "elem_type", type_name(blocks[b].kind, num_nodes(blocks[b].kind)));
-  }
+/// One mesh on its way into a file: first all dimensions and variables are declared, then the values are put.
+class ExodusMesh {
+ public:
+  explicit ExodusMesh(const NodalMesh& mesh);
+  std::string write();
+
+ private:
+  /// Variables of a list of blocks, side sets or node sets.
+  struct ListVariables {
+    int status, ids, names;
+  };
   struct SetVariables {
     int elements, sides, nodes;
   };
-  std::vector<SetVariables> set_variables;
-  int ss_status = 0, ss_prop = 0, ss_names = 0, ns_status = 0, ns_prop = 0, ns_names = 0;
-  if (!sets.empty()) {
-    const int num_side_sets = file.dimension("num_side_sets", sets.size()),
-              num_node_sets = file.dimension("num_node_sets", sets.size());
-    ss_status = file.variable("ss_status", NC_INT, {num_side_sets});
-    ss_prop = file.variable("ss_prop1", NC_INT, {num_side_sets});
-    file.attribute(ss_prop, "name", "ID");
-    ss_names = file.variable("ss_names", NC_CHAR, {num_side_sets, len_name});
-    ns_status = file.variable("ns_status", NC_INT, {num_node_sets});
-    ns_prop = file.variable("ns_prop1", NC_INT, {num_node_sets});
-    file.attribute(ns_prop, "name", "ID");
-    ns_names = file.variable("ns_names", NC_CHAR, {num_node_sets, len_name});
-    for (std::size_t s = 0; s < sets.size(); ++s) {
-      const std::string suffix = std::to_string(s + 1);
-      const int num_sides = file.dimension("num_side_ss" + suffix, sets[s]->sides.size()),
-                num_set_nodes = file.dimension("num_nod_ns" + suffix, sets[s]->nodes.size());
-      set_variables.push_back({file.variable("elem_ss" + suffix, NC_INT, {num_sides}),
-                               file.variable("side_ss" + suffix, NC_INT, {num_sides}),
-                               file.variable("node_ns" + suffix, NC_INT, {num_set_nodes})});
-    }
-  }
-  file.end_declarations();
 
-  file.put(coor_names, table_of({"x", "y", "z"}, 33));
-  for (int k = 0; k < 3; ++k) file.put(coordinate_variables[k], coordinates[k]);
-  file.put(eb_status, std::vector<int>(blocks.size(), 1));
-  file.put(eb_prop, block_ids);
-  file.put(eb_names, table_of(block_names, longest + 1));
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const std::size_t size = num_nodes(blocks[b].kind);
-    const std::vector<std::size_t> places = exodus_places(blocks[b].kind, size);
-    std::vector<int> connect(blocks[b].cells.size() * size);
-    for (std::size_t e = 0; e < blocks[b].cells.size(); ++e)
-      for (std::size_t i = 0; i < size; ++i)
-        connect[e * size + places[i]] = one_based(mesh.cell(blocks[b].cells[e])[i]);
-    file.put(connects[b], connect);
+  void number_nodes();
+  void declare();
+  void declare_blocks(int num_blocks);
+  void declare_sets();
+  ListVariables declare_list(const std::string& prefix, int length);
+  void put_nodes();
+  void put_blocks();
+  void put_sets();
+  void put_list(const ListVariables& list, const std::vector<int>& ids, const std::vector<std::string>& names);
+
+  std::size_t num_nodes(CellKind kind) const {
+    return edges_only_ ? num_edge_nodes(kind, 2) : num_lattice_points(kind, order_);
   }
-  if (sets.empty()) return file.take();
-  const std::vector<int> present(sets.size(), 1);
-  file.put(ss_status, present);
-  file.put(ss_prop, set_ids);
-  file.put(ss_names, table_of(set_names, longest + 1));
-  file.put(ns_status, present);
-  file.put(ns_prop, set_ids);
-  file.put(ns_names, table_of(set_names, longest + 1));
-  for (std::size_t s = 0; s < sets.size(); ++s) {
-    std::vector<int> elements, numbers, set_nodes;
-    for (const Side& side : sets[s]->sides) {
+  int one_based(Index node) const { return number_[static_cast<std::size_t>(node)] + 1; }
+
+  const NodalMesh& mesh_;
+  int order_;
+  bool edges_only_;            // without the nodes inside faces and cells
+  std::vector<Index> number_;  // of each node in the file; kNoIndex if it is left out
+  std::vector<double> coordinates_[3];
+  std::vector<WrittenBlock> blocks_;
+  WrittenSets sets_;
+  std::size_t longest_ = 32;  // of names; older readers expect at least so many
+  ExodusWriter file_;
+  int len_name_ = 0;  // a dimension; the other numbers are those of variables
+  int axis_names_ = 0, axes_[3]{};
+  ListVariables block_list_{}, side_set_list_{}, node_set_list_{};
+  std::vector<int> connects_;
+  std::vector<SetVariables> of_sets_;
+};
+
+ExodusMesh::ExodusMesh(const NodalMesh& mesh)
+    : mesh_(mesh),
+      order_(common_order(mesh, "Exodus", 2)),
+      edges_only_(order_ == 2 && has_edge_nodes_only(mesh)),
+      blocks_(blocks_of(mesh)),
+      sets_(sets_of(mesh, !edges_only_)) {
+  number_nodes();
+  for (const WrittenBlock& block : blocks_) longest_ = std::max(longest_, block.name.size());
+  for (const std::string& name : sets_.names) longest_ = std::max(longest_, name.size());
+}
+
+/// Numbers the nodes of the file. Nodes that no element has are left out, but for vertices.
+void ExodusMesh::number_nodes() {
+  std::vector<bool> used(mesh_.positions.size(), true);
+  if (edges_only_) used = edge_nodes(mesh_, order_);
+  number_.assign(mesh_.positions.size(), kNoIndex);
+  for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
+    if (!used[v]) continue;
+    number_[v] = static_cast<Index>(coordinates_[0].size());
+    for (int k = 0; k < 3; ++k) coordinates_[k].push_back(mesh_.positions[v][k]);
+  }
+}
+
+std::string ExodusMesh::write() {
+  declare();
+  put_nodes();
+  put_blocks();
+  if (!sets_.ids.empty()) put_sets();
+  return file_.take();
+}
+
+void ExodusMesh::declare() {
+  constexpr float kVersion = 5.1f;
+  file_.attribute("api_version", kVersion);
+  file_.attribute("version", kVersion);
+  file_.attribute("floating_point_word_size", 8);
+  file_.attribute("file_size", 1);
+  file_.attribute("maximum_name_length", static_cast<int>(longest_));
+  file_.attribute(NC_GLOBAL, "title", "subvol volume mesh");
+  const int len_string = file_.dimension("len_string", kStringLength);
+  len_name_ = file_.dimension("len_name", longest_ + 1);
+  file_.dimension("len_line", 81);
+  file_.dimension("four", 4);
+  const int time_step = file_.dimension("time_step", NC_UNLIMITED);
+  const int num_dim = file_.dimension("num_dim", 3), nodes = file_.dimension("num_nodes", coordinates_[0].size());
+  file_.dimension("num_elem", mesh_.num_cells());
+  const int num_blocks = file_.dimension("num_el_blk", blocks_.size());
+  file_.variable("time_whole", NC_DOUBLE, {time_step});
+  axis_names_ = file_.variable("coor_names", NC_CHAR, {num_dim, len_string});
+  constexpr const char* kCoordinates[] = {"coordx", "coordy", "coordz"};
+  for (int k = 0; k < 3; ++k) axes_[k] = file_.variable(kCoordinates[k], NC_DOUBLE, {nodes});
+  declare_blocks(num_blocks);
+  if (!sets_.ids.empty()) declare_sets();
+  file_.end_declarations();
+}
+
+ExodusMesh::ListVariables ExodusMesh::declare_list(const std::string& prefix, int length) {
+  ListVariables list{};
+  list.status = file_.variable(prefix + "_status", NC_INT, {length});
+  list.ids = file_.variable(prefix + "_prop1", NC_INT, {length});
+  file_.attribute(list.ids, "name", "ID");
+  list.names = file_.variable(prefix + "_names", NC_CHAR, {length, len_name_});
+  return list;
+}
+
+void ExodusMesh::declare_blocks(int num_blocks) {
+  block_list_ = declare_list("eb", num_blocks);
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const std::string suffix = std::to_string(b + 1);
+    const std::size_t size = num_nodes(blocks_[b].kind);
+    const int elements = file_.dimension("num_el_in_blk" + suffix, blocks_[b].cells.size());
+    const int of_element = file_.dimension("num_nod_per_el" + suffix, size);
+    connects_.push_back(file_.variable("connect" + suffix, NC_INT, {elements, of_element}));
+    file_.attribute(connects_.back(), "elem_type", type_name(blocks_[b].kind, size));
+  }
+}
+
+void ExodusMesh::declare_sets() {
+  const int num_side_sets = file_.dimension("num_side_sets", sets_.ids.size()),
+            num_node_sets = file_.dimension("num_node_sets", sets_.ids.size());
+  side_set_list_ = declare_list("ss", num_side_sets);
+  node_set_list_ = declare_list("ns", num_node_sets);
+  for (std::size_t s = 0; s < sets_.groups.size(); ++s) {
+    const std::string suffix = std::to_string(s + 1);
+    const int num_sides = file_.dimension("num_side_ss" + suffix, sets_.groups[s].sides.size()),
+              num_nodes = file_.dimension("num_nod_ns" + suffix, sets_.groups[s].nodes.size());
+    of_sets_.push_back({file_.variable("elem_ss" + suffix, NC_INT, {num_sides}),
+                        file_.variable("side_ss" + suffix, NC_INT, {num_sides}),
+                        file_.variable("node_ns" + suffix, NC_INT, {num_nodes})});
+  }
+}
+
+void ExodusMesh::put_list(const ListVariables& list, const std::vector<int>& ids,
+                          const std::vector<std::string>& names) {
+  file_.put(list.status, std::vector<int>(ids.size(), 1));  // all are there
+  file_.put(list.ids, ids);
+  file_.put(list.names, table_of(names, longest_ + 1));
+}
+
+void ExodusMesh::put_nodes() {
+  file_.put(axis_names_, table_of({"x", "y", "z"}, kStringLength));
+  for (int k = 0; k < 3; ++k) file_.put(axes_[k], coordinates_[k]);
+}
+
+void ExodusMesh::put_blocks() {
+  std::vector<int> ids;
+  std::vector<std::string> names;
+  for (const WrittenBlock& block : blocks_) {
+    ids.push_back(block.id);
+    names.push_back(block.name);
+  }
+  put_list(block_list_, ids, names);
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const std::size_t size = num_nodes(blocks_[b].kind);
+    const std::vector<std::size_t> places = exodus_places(blocks_[b].kind, size);
+    std::vector<int> connect(blocks_[b].cells.size() * size);
+    for (std::size_t e = 0; e < blocks_[b].cells.size(); ++e)
+      for (std::size_t i = 0; i < size; ++i)
+        connect[e * size + places[i]] = one_based(mesh_.cell(blocks_[b].cells[e])[i]);
+    file_.put(connects_[b], connect);
+  }
+}
+
+void ExodusMesh::put_sets() {
+  put_list(side_set_list_, sets_.ids, sets_.names);
+  put_list(node_set_list_, sets_.ids, sets_.names);
+  std::vector<int> element(mesh_.num_cells());  // number of each cell
+  int next = 0;
+  for (const WrittenBlock& block : blocks_)
+    for (const std::size_t c : block.cells) element[c] = ++next;
+  for (std::size_t s = 0; s < sets_.groups.size(); ++s) {
+    std::vector<int> elements, numbers, nodes;
+    for (const Side& side : sets_.groups[s].sides) {
       elements.push_back(element[side.cell]);
       numbers.push_back(side.number);
     }
-    for (const Index node : sets[s]->nodes) set_nodes.push_back(one_based(node));
-    file.put(set_variables[s].elements, elements);
-    file.put(set_variables[s].sides, numbers);
-    file.put(set_variables[s].nodes, set_nodes);
+    for (const Index node : sets_.groups[s].nodes) nodes.push_back(one_based(node));
+    file_.put(of_sets_[s].elements, elements);
+    file_.put(of_sets_[s].sides, numbers);
+    file_.put(of_sets_[s].nodes, nodes);
   }
-  return file.take();
 }
 
 }  // namespace
 
 std::string exodus_bytes(const NodalMesh& mesh) {
   const std::lock_guard lock(netcdf_lock());
-  return bytes_of(mesh);
+  return ExodusMesh(mesh).write();
 }
 
 #endif

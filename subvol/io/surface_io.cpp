@@ -64,9 +64,8 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   std::size_t num_shortened = 0, num_dropped = 0;
   std::vector<Index> corners, sorted;
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
-    const std::size_t size = mesh.face_offsets[f + 1] - mesh.face_offsets[f];
-    corners.assign(mesh.face_vertices.begin() + mesh.face_offsets[f],
-                   mesh.face_vertices.begin() + mesh.face_offsets[f + 1]);
+    const auto face = mesh.face(f);
+    corners.assign(face.begin(), face.end());
     corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
     while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
     sorted = corners;
@@ -78,7 +77,7 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
     if (corners.size() > kMaxPolygonCorners)
       remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) +
                    " corners, expected at most " + std::to_string(kMaxPolygonCorners));
-    num_shortened += corners.size() < size;
+    num_shortened += corners.size() < face.size();
     if (!of_face.empty()) of_face[kept.num_faces()] = of_face[f];
     kept.face_vertices.insert(kept.face_vertices.end(), corners.begin(), corners.end());
     kept.face_offsets.push_back(kept.face_vertices.size());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/features.h"
 
+#include "subvol/base/angle.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -8,9 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <numbers>
 #include <span>
 
 namespace subvol {
@@ -18,11 +17,6 @@ namespace subvol {
 using namespace internal;
 
 namespace {
-
-/// Returns an angle in [0, 180]; 0 if a vector vanishes. Uses atan2: acos would lose half the digits near 0 and 180.
-double angle_between_degrees(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
-}
 
 /// Returns the direction of the area vector of a triangle or quad, which is half the cross product of the diagonals for
 /// any warp; zero if there is no area.
@@ -55,7 +49,7 @@ std::vector<CreaseEdge> creases_by_angle(const VolumeMesh& mesh, const MeshTopol
     const auto [f0, f1] = edge_faces[e];
     if (f1 == kNoIndex || marks.is_curve(static_cast<Index>(e))) continue;
     const auto [v0, v1] = topology.edge(static_cast<Index>(e));
-    if (angle_between_degrees(normals[f0], normals[f1]) > angle_degrees) creases.push_back({v0, v1});
+    if (angle_degrees_between(normals[f0], normals[f1]) > angle_degrees) creases.push_back({v0, v1});
   }
   return creases;
 }
@@ -85,7 +79,7 @@ std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const MeshTopology&
     const Spokes& s = spokes[v];
     if (s.count < 2) continue;
     const auto& x = mesh.positions;
-    const double turn = angle_between_degrees(x[v] - x[s.ends[0]], x[s.ends[1]] - x[v]);
+    const double turn = angle_degrees_between(x[v] - x[s.ends[0]], x[s.ends[1]] - x[v]);
     if (s.count > 2 || turn > angle_degrees) corners.push_back({static_cast<Index>(v)});
   }
   return corners;

@@ -114,7 +114,11 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
     }
     cell_face_offsets_.push_back(cell_faces_.size());
   }
+  list_edges_of_vertices();
+  mark_boundary();
+}
 
+void MeshTopology::list_edges_of_vertices() {
   vertex_edge_offsets_.assign(num_vertices_ + 1, 0);
   for (const auto& e : edges_) ++vertex_edge_offsets_[e[0] + 1];
   for (std::size_t v = 0; v < num_vertices_; ++v) vertex_edge_offsets_[v + 1] += vertex_edge_offsets_[v];
@@ -124,7 +128,9 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
   for (std::size_t v = 0; v < num_vertices_; ++v)
     std::sort(vertex_edges_.begin() + vertex_edge_offsets_[v], vertex_edges_.begin() + vertex_edge_offsets_[v + 1],
               [&](Index a, Index b) { return edges_[a][1] < edges_[b][1]; });
+}
 
+void MeshTopology::mark_boundary() {
   boundary_edge_.assign(edges_.size(), 0);
   boundary_vertex_.assign(num_vertices_, 0);
   for (std::size_t f = 0; f < face_cells_.size(); ++f) {

@@ -53,6 +53,9 @@ class MeshTopology {
   Index find_edge(Index v0, Index v1) const;
 
  private:
+  void list_edges_of_vertices();
+  void mark_boundary();
+
   std::size_t num_vertices_ = 0;
   std::vector<std::array<Index, 2>> edges_;
   std::vector<std::array<Index, 4>> face_vertices_;

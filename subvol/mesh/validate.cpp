@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/validate.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 namespace subvol {
 
@@ -274,27 +274,19 @@ class Validator {
 
   /// Returns the number of fans of the faces around v: two faces are in one fan if they share an edge at v.
   static int num_fans(const MeshTopology& topology, Index v, std::span<const Index> faces) {
-    std::vector<std::pair<Index, std::size_t>> spokes;  // other end of an edge at v, face
+    std::vector<std::pair<Index, Index>> spokes;  // other end of an edge at v, place of the face
     for (std::size_t i = 0; i < faces.size(); ++i) {
       const auto face = topology.face(faces[i]);
       const std::size_t at = std::find(face.begin(), face.end(), v) - face.begin();
-      spokes.push_back({face[(at + 1) % face.size()], i});
-      spokes.push_back({face[(at + face.size() - 1) % face.size()], i});
+      spokes.push_back({face[(at + 1) % face.size()], static_cast<Index>(i)});
+      spokes.push_back({face[(at + face.size() - 1) % face.size()], static_cast<Index>(i)});
     }
     std::sort(spokes.begin(), spokes.end());
-    std::vector<std::size_t> group(faces.size());
-    std::iota(group.begin(), group.end(), std::size_t{0});
-    const auto root = [&](std::size_t i) {
-      while (group[i] != i) i = group[i] = group[group[i]];
-      return i;
-    };
-    int groups = static_cast<int>(faces.size());
-    for (std::size_t i = 0; i + 1 < spokes.size(); ++i) {
-      if (spokes[i].first != spokes[i + 1].first) continue;
-      const std::size_t r = root(spokes[i].second), s = root(spokes[i + 1].second);
-      if (r != s) group[r] = s, --groups;
-    }
-    return groups;
+    DisjointSets fans(faces.size());
+    for (std::size_t i = 0; i + 1 < spokes.size(); ++i)
+      if (spokes[i].first == spokes[i + 1].first) fans.join(spokes[i].second, spokes[i + 1].second);
+    std::vector<Index> numbers;
+    return static_cast<int>(fans.number(numbers));
   }
 
   // The first cell sees the corners of a face in the stored order; the second must see the same loop backwards.
@@ -394,6 +386,14 @@ class Validator {
 }  // namespace
 
 std::vector<MeshDefect> validate(const VolumeMesh& mesh) { return Validator(mesh).run(); }
+
+void require_valid(const VolumeMesh& mesh, const std::string& what, InvertedCells inverted) {
+  for (const MeshDefect& defect : validate(mesh)) {
+    const bool is_allowed = defect.kind == Kind::unused_vertex ||
+                            (defect.kind == Kind::inverted_cell && inverted == InvertedCells::allowed);
+    if (!is_allowed) throw InputError(what + ": " + defect.message);
+  }
+}
 
 void require_groups(const VolumeFaceGroups& groups, const std::string& what) {
   for (const GroupedFace& entry : groups.faces)

@@ -39,6 +39,12 @@ struct MeshDefect {
 /// Cost: linear in the mesh, apart from sorts of its cells and faces.
 std::vector<MeshDefect> validate(const VolumeMesh& mesh);
 
+enum class InvertedCells { refused, allowed };
+
+/// Throws InputError with `what` and the first defect if a mesh has any, apart from unused vertices, and from inverted
+/// cells if these are allowed.
+void require_valid(const VolumeMesh& mesh, const std::string& what, InvertedCells inverted = InvertedCells::refused);
+
 /// Throws InputError, naming `what`, if a grouped face names a group that is not there.
 void require_groups(const VolumeFaceGroups& groups, const std::string& what);
 

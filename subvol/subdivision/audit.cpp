@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/subdivision/audit.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/subdivision/surface_refinement.h"
 #include "subvol/surface/sheets.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 namespace subvol {
 
@@ -19,35 +20,19 @@ namespace {
 
 constexpr double kSlack = std::numbers::pi / 180;  // one degree: angles this close to straight are noise
 
-/// Groups the corners of boundary faces at each vertex, joined across shared edges: each group is one fan.
-class Fans {
- public:
-  explicit Fans(std::size_t num_corners) : parents_(num_corners) { std::iota(parents_.begin(), parents_.end(), 0); }
-  std::size_t find(std::size_t i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void join(std::size_t a, std::size_t b) { parents_[find(a)] = find(b); }
-
- private:
-  std::vector<std::size_t> parents_;
-};
-
 void find_nonmanifold(const MeshTopology& topology, SubdivisionAudit& result) {
   std::vector<int> counts(topology.num_edges(), 0);
   std::vector<Index> corner_vertices;
-  std::vector<std::array<std::size_t, 2>> edge_corners(topology.num_edges());  // a corner at either end of an edge
-  Fans fans([&] {
-    std::size_t n = 0;
-    for (Index f : topology.boundary_faces()) n += topology.face(f).size();
-    return n;
-  }());
+  std::vector<std::array<Index, 2>> edge_corners(topology.num_edges());  // a corner at either end of an edge
+  std::size_t num_corners = 0;
+  for (Index f : topology.boundary_faces()) num_corners += topology.face(f).size();
+  DisjointSets fans(num_corners);  // of the corners at a vertex, joined across edges
   for (Index f : topology.boundary_faces()) {
     const auto face = topology.face(f);
     const std::size_t first = corner_vertices.size(), n = face.size();
     corner_vertices.insert(corner_vertices.end(), face.begin(), face.end());
     for (std::size_t i = 0; i < n; ++i) {
-      std::array<std::size_t, 2> ends = {first + i, first + (i + 1) % n};
+      std::array<Index, 2> ends = {static_cast<Index>(first + i), static_cast<Index>(first + (i + 1) % n)};
       if (face[i] > face[(i + 1) % n]) std::swap(ends[0], ends[1]);
       const Index e = topology.find_edge(face[i], face[(i + 1) % n]);
       if (counts[e]++ == 0) {
@@ -63,7 +48,7 @@ void find_nonmanifold(const MeshTopology& topology, SubdivisionAudit& result) {
     if (counts[e] > 0 && counts[e] != 2) result.nonmanifold_edges.push_back(topology.edge(static_cast<Index>(e)));
   }
   std::vector<int> fan_counts(topology.num_vertices(), 0);
-  for (std::size_t h = 0; h < corner_vertices.size(); ++h) fan_counts[corner_vertices[h]] += fans.find(h) == h;
+  for (Index h = 0; h < static_cast<Index>(num_corners); ++h) fan_counts[corner_vertices[h]] += fans.of(h) == h;
   for (std::size_t v = 0; v < fan_counts.size(); ++v)
     if (fan_counts[v] > 1) result.nonmanifold_vertices.push_back(static_cast<Index>(v));
   std::sort(result.nonmanifold_edges.begin(), result.nonmanifold_edges.end());
@@ -96,12 +81,7 @@ void find_flattened(const VolumeMesh& mesh, const MeshTopology& topology, Subdiv
 }
 
 Vec3 face_normal(const SurfaceTopology& surface, Index f, std::span<const Vec3> points) {
-  Vec3 area = Vec3::Zero();
-  const auto face = surface.face(f);
-  const Vec3& origin = points[face[0]];
-  for (std::size_t i = 1; i + 1 < face.size(); ++i)
-    area += (points[face[i]] - origin).cross(points[face[i + 1]] - origin);
-  return area.normalized();
+  return doubled_area_vector(points, surface.face(f)).normalized();
 }
 
 bool is_reflex(const SurfaceTopology& surface, Index e, std::span<const Vec3> points) {

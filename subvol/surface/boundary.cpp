@@ -110,8 +110,7 @@ TriangleMesh triangulate(const PolygonMesh& polygons, std::vector<Index>* polygo
   if (polygon_of_triangle) polygon_of_triangle->clear();
   PolygonCutter cutter(result.positions, result.triangles);
   for (std::size_t f = 0; f < polygons.num_faces(); ++f) {
-    cutter.cut({polygons.face_vertices.data() + polygons.face_offsets[f],
-                polygons.face_offsets[f + 1] - polygons.face_offsets[f]});
+    cutter.cut(polygons.face(f));
     if (polygon_of_triangle) polygon_of_triangle->resize(result.triangles.size(), static_cast<Index>(f));
     if (!polygons.face_groups.empty())
       result.face_groups.of_face.resize(result.triangles.size(), polygons.face_groups.of_face[f]);

@@ -18,8 +18,7 @@ FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface,
   for (const CornerVertex& corner : tags.corners) corners[corner.vertex] = corner.sharpness;
   FeatureTags result;
   for (std::size_t f = 0; f < surface.num_faces() && !creases.empty(); ++f) {
-    const std::size_t begin = surface.face_offsets[f];
-    const std::span<const Index> face(surface.face_vertices.data() + begin, surface.face_offsets[f + 1] - begin);
+    const auto face = surface.face(f);
     for (std::size_t k = 0; k < face.size(); ++k) {
       const Index a = face[k], b = face[(k + 1) % face.size()];
       const auto found = creases.find(std::minmax(vertex_numbers[a], vertex_numbers[b]));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/part_nesting.h"
 
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/winding_number.h"
 
 #include <Eigen/Geometry>
@@ -71,10 +72,7 @@ struct Parts {
   double volume(std::size_t p) const {
     const Vec3 origin = mesh.positions[mesh.triangles[triangles[p].front()][0]];
     double sum = 0;
-    for (Index t : triangles[p]) {
-      const auto& [a, b, c] = mesh.triangles[t];
-      sum += (mesh.positions[a] - origin).dot((mesh.positions[b] - origin).cross(mesh.positions[c] - origin));
-    }
+    for (Index t : triangles[p]) sum += sixfold_volume(mesh.positions, mesh.triangles[t], origin);
     return sum / 6;
   }
   /// Returns a part's surface, turned outward.

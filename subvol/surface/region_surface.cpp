@@ -5,6 +5,7 @@
 #include "subvol/base/format.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 #include "subvol/surface/winding_number.h"
 
@@ -23,16 +24,6 @@ namespace subvol {
 using namespace internal;
 
 namespace {
-
-/// Returns six times the signed volume between a triangle and the origin.
-double volume_below(const TriangleMesh& mesh, const std::array<Index, 3>& t, const Vec3& origin) {
-  return (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
-}
-
-double area_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
-  const Vec3& a = mesh.positions[t[0]];
-  return 0.5 * (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm();
-}
 
 /// Returns the place of a region in the surface's list, which is sorted by number.
 std::size_t place_of(const RegionSurface& surface, int region) {
@@ -163,9 +154,9 @@ class RegionFinder {
       part.triangles.push_back(static_cast<Index>(t));
       for (const Index v : mesh_.triangles[t]) part.box.extend(mesh_.positions[v]);
       const Vec3& origin = mesh_.positions[mesh_.triangles[static_cast<std::size_t>(part.triangles[0])][0]];
-      const double below = volume_below(mesh_, mesh_.triangles[t], origin) / 6;
+      const double below = sixfold_volume(mesh_.positions, mesh_.triangles[t], origin) / 6;
       part.own_volume += below;
-      const double area = area_of(mesh_, mesh_.triangles[t]);
+      const double area = triangle_area(mesh_, mesh_.triangles[t]);
       for (const std::size_t side : {2 * t, 2 * t + 1}) {
         const auto first = static_cast<std::size_t>(cells_.of(static_cast<Index>(side)));
         if (first == side) {
@@ -318,7 +309,7 @@ class RegionFinder {
     std::map<std::pair<Index, std::size_t>, double> shared;  // by group and region
     for (std::size_t t = 0; t < surface.sides.size(); ++t) {
       const Index g = groups.of_face[t];
-      const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
+      const double one = triangle_area(surface.mesh, surface.mesh.triangles[t]);
       if (g != kNoIndex) of_group[g] += one;
       for (const int side : surface.sides[t]) {
         if (side == kOutside) continue;
@@ -421,7 +412,7 @@ void orient_sheets(RegionSurface& surface) {
       const std::size_t r = place_of(surface, region);
       if (origins[r] == kNoIndex) origins[r] = surface.mesh.triangles[t][0];
       const Vec3& origin = surface.mesh.positions[origins[r]];
-      const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
+      const double below = sixfold_volume(surface.mesh.positions, surface.mesh.triangles[t], origin) / 6;
       surface.volumes[r] += region == behind ? below : -below;
     }
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/sheets.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 
 namespace subvol::internal {
@@ -73,31 +73,21 @@ class FeatureFinder {
     }
   }
 
-  Index find(Index h) {
-    while (parents_[h] != h) h = parents_[h] = parents_[parents_[h]];
-    return h;
-  }
-
   void number_fans() {
     const std::size_t n = result_.corner_vertices.size();
-    parents_.resize(n);
-    std::iota(parents_.begin(), parents_.end(), 0);
-    for (std::size_t h = 0; h < n; ++h) {
-      const Index twin = result_.twins[h];
-      if (twin == kNoIndex) continue;
-      const Index a = find(static_cast<Index>(h)), b = find(next(twin));
-      parents_[std::max(a, b)] = std::min(a, b);
-    }
-    std::vector<Index> roots;
+    DisjointSets fans(n);
     for (std::size_t h = 0; h < n; ++h)
-      if (find(static_cast<Index>(h)) == static_cast<Index>(h)) roots.push_back(static_cast<Index>(h));
-    std::ranges::stable_sort(roots, {}, [&](Index h) { return result_.corner_vertices[h]; });
+      if (const Index twin = result_.twins[h]; twin != kNoIndex) fans.join(static_cast<Index>(h), next(twin));
+    std::vector<Index> first_corners;
+    for (std::size_t h = 0; h < n; ++h)
+      if (fans.of(static_cast<Index>(h)) == static_cast<Index>(h)) first_corners.push_back(static_cast<Index>(h));
+    std::ranges::stable_sort(first_corners, {}, [&](Index h) { return result_.corner_vertices[h]; });
     std::vector<Index> number(n, kNoIndex);
-    for (const Index root : roots) {
-      number[root] = static_cast<Index>(result_.fan_vertices.size());
-      result_.fan_vertices.push_back(result_.corner_vertices[root]);
+    for (const Index h : first_corners) {
+      number[h] = static_cast<Index>(result_.fan_vertices.size());
+      result_.fan_vertices.push_back(result_.corner_vertices[h]);
     }
-    for (std::size_t h = 0; h < n; ++h) result_.fan_of_corner.push_back(number[find(static_cast<Index>(h))]);
+    for (std::size_t h = 0; h < n; ++h) result_.fan_of_corner.push_back(number[fans.of(static_cast<Index>(h))]);
   }
 
   void find_corners() {
@@ -137,7 +127,7 @@ class FeatureFinder {
   const VolumeMesh& mesh_;
   const MeshTopology& topology_;
   SheetFeatures result_;
-  std::vector<Index> face_of_corner_, parents_;
+  std::vector<Index> face_of_corner_;
 };
 
 }  // namespace

@@ -7,11 +7,10 @@
 #include "subvol/surface/orientation.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/rim_loops.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Dense>
-#include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -154,10 +153,7 @@ SolidBoundary solid_boundary(const TriangleMesh& surface) {
       std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   // A surface with a volume below kFlat area^(3/2) is flat up to rounding.
   double area = 0;
-  for (const auto& t : mesh.triangles) {
-    const Vec3& a = mesh.positions[t[0]];
-    area += (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm() / 2;
-  }
+  for (const auto& t : mesh.triangles) area += triangle_area(mesh, t);
   constexpr double kFlat = 1e-6;
   if (!(result.volume > kFlat * area * std::sqrt(area))) throw InputError("surface: it encloses no volume");
   result.surface = std::move(mesh);

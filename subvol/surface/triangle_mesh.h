@@ -5,6 +5,8 @@
 #include "subvol/mesh/face_groups.h"
 
 #include <array>
+#include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,7 +25,11 @@ struct PolygonMesh {
   std::vector<std::size_t> face_offsets{0};
   std::vector<Index> face_vertices;
   FaceGroups face_groups{};
+
   std::size_t num_faces() const { return face_offsets.size() - 1; }
+  std::span<const Index> face(std::size_t f) const {
+    return std::span(face_vertices).subspan(face_offsets[f], face_offsets[f + 1] - face_offsets[f]);
+  }
 };
 
 }  // namespace subvol

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -200,8 +201,7 @@ double signed_volume_of(const TriangleMesh& mesh) {
   for (const auto& t : mesh.triangles) {
     Index& first = origins[parts.of(t[0])];
     if (first == kNoIndex) first = t[0];
-    const Vec3& origin = mesh.positions[first];
-    sum += (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
+    sum += sixfold_volume(mesh.positions, t, mesh.positions[first]);
   }
   return sum / 6;
 }

@@ -42,7 +42,8 @@ struct SurfaceHalfEdge {
 
 /// Returns the sides of all triangles, those of one edge in succession: sorted by `low`, `high` and `triangle`.
 ///
-/// triangles  of vertices 0 .. num_vertices - 1, with three different corners each. Cost: almost linear.
+/// triangles  of vertices 0 .. num_vertices - 1. One with equal corners has a side from a vertex to itself.
+/// Cost: almost linear.
 std::vector<SurfaceHalfEdge> sorted_half_edges(std::span<const std::array<Index, 3>> triangles,
                                                std::size_t num_vertices);
 

@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
-#include "subvol/templates/template_edit.h"
+#include "subvol/mesh/validate.h"
 
 #include <algorithm>
 #include <array>
@@ -98,46 +98,44 @@ std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topolo
   return axes;
 }
 
-/// Gives the parts of faces the groups of the faces.
-void inherit_groups(const VolumeMesh& mesh, VolumeMesh& result) {
-  result.regions = mesh.regions;
-  if (!mesh.face_groups.empty()) result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result));
-}
+/// Cuts of the columns of hexes that follow an edge: where the faces at the ends of each hex are cut into triangles.
+class ColumnCuts {
+ public:
+  ColumnCuts(const VolumeMesh& mesh, const MeshTopology& topology, Index v0, Index v1)
+      : mesh_(mesh),
+        topology_(topology),
+        axes_(carried_axes(mesh, topology, v0, v1)),
+        cut_at_(topology.num_faces(), kNoIndex),
+        seen_(mesh.num_cells(), 0) {
+    for (std::size_t seed = 0; seed < mesh.num_cells(); ++seed) {
+      if (axes_[seed] == kNoIndex)
+        throw InputError("split: cell " + std::to_string(seed) + " is not connected with the edge");
+      if (cut_at_[end_faces(seed)[0]] == kNoIndex) cut_column(seed);
+    }
+  }
 
-}  // namespace
-
-VolumeMesh split_into_tets(const VolumeMesh& mesh) {
-  require_sound(mesh, "split");
-  VolumeMesh result;
-  result.positions = mesh.positions;
-  result.tags = mesh.tags;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) fan_tets(mesh, c, result);
-  require_sound(result, "split");
-  inherit_groups(mesh, result);
-  return result;
-}
-
-VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
-  require_sound(mesh, "split");
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    if (mesh.kinds[c] != CellKind::hex) throw InputError("split: cell " + std::to_string(c) + " is no hex");
-  const MeshTopology topology(mesh);
-  const std::vector<int> axes = carried_axes(mesh, topology, v0, v1);
-  // For each axis, the lower face in right-hand order about it, and then the corners above.
-  constexpr std::array<std::array<int, 8>, 3> kUpright{
-      {{0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}, {0, 1, 2, 3, 4, 5, 6, 7}}};
-  // One end of the diagonal that cuts each face, or kNoIndex for a face that is not cut.
-  std::vector<Index> cut_at(topology.num_faces(), kNoIndex);
-  const auto upright = [&](std::size_t c) {
+  /// Returns the lower face of a hex in right-hand order about its axis, and then the corners above.
+  std::array<Index, 8> upright(std::size_t c) const {
+    constexpr std::array<std::array<int, 8>, 3> kUpright{
+        {{0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}, {0, 1, 2, 3, 4, 5, 6, 7}}};
     std::array<Index, 8> corners{};
-    for (std::size_t i = 0; i < 8; ++i) corners[i] = mesh.cell(c)[kUpright[axes[c]][i]];
+    for (std::size_t i = 0; i < 8; ++i) corners[i] = mesh_.cell(c)[kUpright[axes_[c]][i]];
     return corners;
-  };
-  const auto end_faces = [&](std::size_t c) {
+  }
+  /// Returns the place among the first four of these corners of an end of the diagonal that cuts the lower face.
+  std::size_t cut_corner(std::size_t c) const {
+    const auto corners = upright(c);
+    return static_cast<std::size_t>(std::find(corners.begin(), corners.begin() + 4, cut_at_[end_faces(c)[0]]) -
+                                    corners.begin());
+  }
+
+ private:
+  /// Returns the lower and the upper face of a hex.
+  std::array<Index, 2> end_faces(std::size_t c) const {
     const auto corners = upright(c);
     std::array<Index, 2> ends{kNoIndex, kNoIndex};
-    for (Index f : topology.cell_faces(c)) {
-      const auto face = topology.face(f);
+    for (Index f : topology_.cell_faces(c)) {
+      const auto face = topology_.face(f);
       const auto in_face = [&](std::size_t first) {
         return std::all_of(corners.begin() + static_cast<std::ptrdiff_t>(first),
                            corners.begin() + static_cast<std::ptrdiff_t>(first) + 4,
@@ -147,42 +145,73 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
       if (in_face(4)) ends[1] = f;
     }
     return ends;
-  };
-  std::vector<char> seen(mesh.num_cells(), 0);
-  std::vector<std::size_t> column;
-  for (std::size_t seed = 0; seed < mesh.num_cells(); ++seed) {
-    if (axes[seed] == kNoIndex)
-      throw InputError("split: cell " + std::to_string(seed) + " is not connected with the edge");
+  }
+  /// Cuts the lower face of a hex, and the other faces of its column alike.
+  void cut_column(std::size_t seed) {
     const Index first = end_faces(seed)[0];
-    if (cut_at[first] != kNoIndex) continue;
-    const auto face = topology.face(first);
-    cut_at[first] = *std::min_element(face.begin(), face.end());
-    column.assign(1, seed);
-    seen[seed] = 1;
+    const auto face = topology_.face(first);
+    cut_at_[first] = *std::min_element(face.begin(), face.end());
+    std::vector<std::size_t> column{seed};
+    seen_[seed] = 1;
     for (std::size_t q = 0; q < column.size(); ++q) {
-      const std::size_t c = column[q];
-      const auto corners = upright(c);
-      const auto ends = end_faces(c);
-      for (int side = 0; side < 2; ++side) {  // carries the cut from one end to the other
-        if (cut_at[ends[side]] == kNoIndex) continue;
-        const auto i = std::find(corners.begin(), corners.end(), cut_at[ends[side]]) - corners.begin();
-        if (cut_at[ends[1 - side]] == kNoIndex) cut_at[ends[1 - side]] = corners[static_cast<std::size_t>((i + 4) % 8)];
-      }
+      const auto ends = end_faces(column[q]);
+      carry_cut(upright(column[q]), ends);
       for (Index f : ends)
-        for (Index other : topology.face_cells(f))
-          if (other != kNoIndex && !seen[other]) {
-            seen[other] = 1;
+        for (Index other : topology_.face_cells(f))
+          if (other != kNoIndex && !seen_[other]) {
+            seen_[other] = 1;
             column.push_back(static_cast<std::size_t>(other));
           }
     }
   }
+  /// Carries the cut from one end of a hex to the other.
+  void carry_cut(const std::array<Index, 8>& corners, const std::array<Index, 2>& ends) {
+    for (int side = 0; side < 2; ++side) {
+      if (cut_at_[ends[side]] == kNoIndex) continue;
+      const auto i = std::find(corners.begin(), corners.end(), cut_at_[ends[side]]) - corners.begin();
+      Index& other = cut_at_[ends[1 - side]];
+      if (other == kNoIndex) other = corners[static_cast<std::size_t>((i + 4) % 8)];
+    }
+  }
+
+  const VolumeMesh& mesh_;
+  const MeshTopology& topology_;
+  std::vector<int> axes_;      // of each hex: see carried_axes
+  std::vector<Index> cut_at_;  // one end of the diagonal that cuts each face; kNoIndex: it is not cut
+  std::vector<char> seen_;     // not zero for the hexes of columns that were cut
+};
+
+/// Gives the parts of faces the groups of the faces.
+void inherit_groups(const VolumeMesh& mesh, VolumeMesh& result) {
+  result.regions = mesh.regions;
+  if (!mesh.face_groups.empty()) result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result));
+}
+
+}  // namespace
+
+VolumeMesh split_into_tets(const VolumeMesh& mesh) {
+  require_valid(mesh, "split");
+  VolumeMesh result;
+  result.positions = mesh.positions;
+  result.tags = mesh.tags;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) fan_tets(mesh, c, result);
+  require_valid(result, "split");
+  inherit_groups(mesh, result);
+  return result;
+}
+
+VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
+  require_valid(mesh, "split");
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (mesh.kinds[c] != CellKind::hex) throw InputError("split: cell " + std::to_string(c) + " is no hex");
+  const MeshTopology topology(mesh);
+  const ColumnCuts cuts(mesh, topology, v0, v1);
   VolumeMesh result;
   result.positions = mesh.positions;
   result.tags = mesh.tags;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    const auto corners = upright(c);
-    const auto at = static_cast<std::size_t>(std::find(corners.begin(), corners.begin() + 4, cut_at[end_faces(c)[0]]) -
-                                             corners.begin());
+    const auto corners = cuts.upright(c);
+    const std::size_t at = cuts.cut_corner(c);
     for (std::size_t half = 0; half < 2; ++half) {
       const std::size_t a = at % 4, b = (at + 1 + half) % 4, d = (at + 2 + half) % 4;
       result.add_cell(CellKind::prism, std::array<Index, 6>{corners[a], corners[b], corners[d], corners[a + 4],
@@ -190,7 +219,7 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
       if (!mesh.references.empty()) result.references.push_back(mesh.references[c]);
     }
   }
-  require_sound(result, "split");
+  require_valid(result, "split");
   inherit_groups(mesh, result);
   return result;
 }

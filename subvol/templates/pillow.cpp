@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/pillow.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/surface/surface_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/template_edit.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -94,11 +95,6 @@ void require_manifold(std::span<const SetFace> faces, std::span<const Index> num
   }
 }
 
-Vec3 unit_normal(const VolumeMesh& mesh, std::span<const Index> face) {
-  const auto p = [&](std::size_t i) -> const Vec3& { return mesh.positions[face[i]]; };
-  return (face.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
-}
-
 /// Displacement of each vertex of the faces: against the sum of its distinct normals, in proportion to its shortest
 /// edge in the set.
 std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set) {
@@ -115,7 +111,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
   }
   std::vector<std::vector<Vec3>> normals(mesh.num_vertices());
   for (const SetFace& face : faces) {
-    const Vec3 n = unit_normal(mesh, face.vertices());
+    const Vec3 n = normal_of_face(mesh.positions, face.vertices());
     for (Index v : face.vertices())
       if (std::none_of(normals[v].begin(), normals[v].end(), [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
         normals[v].push_back(n);
@@ -159,26 +155,21 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
 /// Returns the faces of those connected parts of a boundary that are wanted.
 std::vector<SetFace> chosen_parts(std::span<const SetFace> faces, std::size_t num_vertices, int reference,
                                   const PillowChoice& takes) {
-  std::vector<Index> part(num_vertices);
-  std::iota(part.begin(), part.end(), 0);
-  const auto root = [&](Index v) {
-    while (part[v] != v) v = part[v] = part[part[v]];
-    return v;
-  };
+  DisjointSets vertices(num_vertices);
   for (const SetFace& face : faces)
-    for (const Index v : face.vertices()) part[root(v)] = root(face.corners[0]);
+    for (const Index v : face.vertices()) vertices.join(v, face.corners[0]);
   std::map<Index, std::vector<std::array<Index, 4>>> parts;
   const auto corners = [](const SetFace& face) {
     std::array<Index, 4> all = face.corners;
     for (std::size_t i = face.size; i < all.size(); ++i) all[i] = kNoIndex;
     return all;
   };
-  for (const SetFace& face : faces) parts[root(face.corners[0])].push_back(corners(face));
+  for (const SetFace& face : faces) parts[vertices.of(face.corners[0])].push_back(corners(face));
   std::map<Index, bool> is_wanted;
   for (const auto& [first, members] : parts) is_wanted[first] = takes(reference, members);
   std::vector<SetFace> chosen;
   for (const SetFace& face : faces)
-    if (is_wanted[root(face.corners[0])]) chosen.push_back(face);
+    if (is_wanted[vertices.of(face.corners[0])]) chosen.push_back(face);
   return chosen;
 }
 
@@ -314,14 +305,14 @@ std::vector<Index> own_numbers(const VolumeMesh& mesh) {
 }  // namespace
 
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
-  require_sound(mesh, "pillow");
+  require_valid(mesh, "pillow");
   const std::vector<char> in_set = marked(mesh, cells);
   std::vector<Index> origins = own_numbers(mesh);
   return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set, origins);
 }
 
 VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
-  require_sound(mesh, "pillow");
+  require_valid(mesh, "pillow");
   VolumeMesh result = mesh;
   std::vector<Index> origins = own_numbers(mesh);
   for (const int reference : region_references(mesh)) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/plane_grid.h"
 
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/template_frames.h"
 
 #include <Eigen/Dense>
@@ -21,8 +22,7 @@ namespace {
 constexpr double kLeastPlane = 0.5;  // smallest area of a plane with a line, in units of the squared size of a cell
 
 Vec3 area_vector(const TriangleMesh& surface, const std::array<Index, 3>& t) {
-  const Vec3 &a = surface.positions[t[0]], &b = surface.positions[t[1]], &c = surface.positions[t[2]];
-  return (b - a).cross(c - a) / 2;
+  return doubled_area_vector(surface, t) / 2;
 }
 
 std::vector<Vec3> area_vectors(const TriangleMesh& surface) {

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/templates/template_edit.h"
 
 #include <Eigen/Geometry>
@@ -398,7 +399,7 @@ LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> mar
 }
 
 VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
-  require_sound(mesh, "refine");
+  require_valid(mesh, "refine");
   return refine_locally(mesh, marked, WarpedParts::refused).mesh;
 }
 

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/auto_template.h"
 #include "subvol/templates/plane_grid.h"
 #include "subvol/templates/search_stop.h"
@@ -30,8 +31,7 @@ constexpr double kAllPlanes = 0.999;  ///< share from which on the grid is taken
 
 double area_of(const TriangleMesh& mesh) {
   double area = 0;
-  for (const auto& [a, b, c] : mesh.triangles)
-    area += 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
+  for (const auto& t : mesh.triangles) area += triangle_area(mesh, t);
   return area;
 }
 
@@ -72,6 +72,19 @@ class RegionSearch {
   std::optional<LabeledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
   std::optional<LabeledGrid> best_of_cubes(double cells, double most_cells);
   std::optional<LabeledGrid> labeled(VoxelGrid grid, double cells, bool is_exact);
+  LabelFractions fractions_in(const VoxelGrid& grid);
+  LabeledGrid scored(VoxelGrid grid, const VoxelLabels& labels, const LabelFractions& fractions) const;
+  struct Faults {
+    std::vector<char> is_wrong;  ///< by region
+    bool same_pairs = false;     ///< true if the same regions meet as in the surface
+    std::size_t wrong_sheets = 0;
+
+    bool none() const { return same_pairs && std::ranges::count(is_wrong, 0) == std::ssize(is_wrong); }
+  };
+  /// found  topology of the labels; null: not all cells could be labeled.
+  Faults faults_of(const VoxelLabels& labels, const RegionTopology* found) const;
+  /// Raises the weights of wrong regions that are thin. Returns false if there are none.
+  bool raise_weights(std::span<const char> is_wrong, double cell_length, std::vector<double>& weights);
   double size_for(double cells, bool counts_pillow) const;
   double count_of(const VoxelLabels& labels, bool counts_pillow) const;
   RegionTemplate finished(const LabeledGrid& candidate, std::size_t cells) const;
@@ -114,32 +127,34 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
   return static_cast<double>(count);
 }
 
-/// Labels a grid. Returns nothing if its regions cannot be made right.
-std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
-  constexpr int kWeightRounds = 5, kLinesOfCell = 4;
-  constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
+/// Returns the shares of each cell that lie outside and in each region; incomplete if the search was stopped.
+LabelFractions RegionSearch::fractions_in(const VoxelGrid& grid) {
+  constexpr int kLinesOfCell = 4;
   const auto num_regions = static_cast<int>(surface_.regions.size());
-  ++num_grids_;
   LabelFractions fractions(static_cast<std::size_t>(num_regions) + 1);
   ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic)
   for (int r = 0; r < num_regions; ++r)
     errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid, kLinesOfCell, &stop_); });
   errors.rethrow();
-  if (stop_.is_stopped()) return std::nullopt;
+  if (stop_.is_stopped()) return fractions;
   fractions[0].assign(grid.num_cells(), 1.0);
   for (int r = 1; r <= num_regions; ++r)
     for (std::size_t c = 0; c < grid.num_cells(); ++c)
       fractions[0][c] = std::max(0.0, fractions[0][c] - fractions[r][c]);
-  const std::vector<double> volumes = cell_volumes(grid);
-  const double unit = std::abs(grid.edges.determinant());
-  const double cell_length = std::cbrt(volume_ / cells);
+  return fractions;
+}
 
+/// Labels a grid. Returns nothing if its regions cannot be made right.
+std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
+  constexpr int kWeightRounds = 5;
+  ++num_grids_;
+  const LabelFractions fractions = fractions_in(grid);
   std::vector<double> weights(fractions.size(), 1.0);
   for (int round = 0; round < kWeightRounds; ++round) {
     if (stop_.is_stopped()) return std::nullopt;
-    VoxelLabels labels(grid.cells, num_regions, is_exact ? VertexRule::manifold : VertexRule::pillowable);
-    std::vector<char> is_wrong(surface_.regions.size(), 0);
+    VoxelLabels labels(grid.cells, static_cast<int>(surface_.regions.size()),
+                       is_exact ? VertexRule::manifold : VertexRule::pillowable);
     const bool assigned = assign_labels(labels, fractions, weights, wanted_, voids_, &stop_);
     if (stop_.is_stopped()) return std::nullopt;
     RegionTopology found;
@@ -148,53 +163,72 @@ std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, b
       found = labels.topology(&stop_);
       if (stop_.is_stopped()) return std::nullopt;
     }
-    bool all_right = assigned;
-    for (std::size_t r = 0; r < is_wrong.size(); ++r) {
-      std::vector<int> component;
-      is_wrong[r] = assigned ? found.regions[r] != wanted_.regions[r]
-                             : labels.components(static_cast<int>(r) + 1, component) != wanted_.regions[r].components;
-      all_right = all_right && !is_wrong[r];
+    const Faults faults = faults_of(labels, assigned ? &found : nullptr);
+    if (faults.none()) {
+      LabeledGrid result = scored(std::move(grid), labels, fractions);
+      result.wrong_sheets = faults.wrong_sheets;
+      result.share = count_of(labels, options_.for_pillow && !is_exact) / cells;
+      return result;
     }
-    bool same_pairs = assigned && found.sheets.size() == wanted_.sheets.size();
-    std::size_t wrong_sheets = 0;
-    for (const auto& [pair, sheet] : wanted_.sheets) {
-      const auto at = found.sheets.find(pair);
-      if (at == found.sheets.end()) {
-        same_pairs = false;
-        for (const int side : pair)
-          if (side != kOutside && assigned) is_wrong[static_cast<std::size_t>(side - 1)] = 1;
-      } else {
-        wrong_sheets += at->second != sheet;
-      }
-    }
-    // What separates two regions that must not touch is too thin.
-    for (const auto& [pair, sheet] : found.sheets)
-      if (!wanted_.sheets.contains(pair))
-        for (std::size_t r = 0; r < is_wrong.size(); ++r) {
-          const auto touches = [&](int other) {
-            const auto [low, high] = std::minmax({static_cast<int>(r) + 1, other});
-            return wanted_.sheets.contains({low, high});
-          };
-          if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
-        }
-    if (all_right && same_pairs) {
-      LabeledGrid candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
-      for (std::size_t c = 0; c < labels.num_cells(); ++c)
-        candidate.score += (1 - fractions[labels.label(static_cast<Index>(c))][c]) * unit *
-                           (volumes.empty() ? 1 : volumes[c]) / volume_;
-      candidate.share = count_of(labels, options_.for_pillow && !is_exact) / cells;
-      return candidate;
-    }
-    bool raised = false;
-    for (std::size_t r = 0; r < is_wrong.size(); ++r) {
-      misses_[r] += is_wrong[r] != 0;
-      if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThin * cell_length) continue;
-      weights[r + 1] *= kRaise;
-      raised = true;
-    }
-    if (!raised) break;
+    if (!raise_weights(faults.is_wrong, std::cbrt(volume_ / cells), weights)) break;
   }
   return std::nullopt;
+}
+
+LabeledGrid RegionSearch::scored(VoxelGrid grid, const VoxelLabels& labels, const LabelFractions& fractions) const {
+  const std::vector<double> volumes = cell_volumes(grid);
+  const double unit = std::abs(grid.edges.determinant());
+  LabeledGrid result{std::move(grid), {labels.labels().begin(), labels.labels().end()}};
+  for (std::size_t c = 0; c < labels.num_cells(); ++c)
+    result.score +=
+        (1 - fractions[labels.label(static_cast<Index>(c))][c]) * unit * (volumes.empty() ? 1 : volumes[c]) / volume_;
+  return result;
+}
+
+RegionSearch::Faults RegionSearch::faults_of(const VoxelLabels& labels, const RegionTopology* found) const {
+  Faults faults{std::vector<char>(surface_.regions.size(), 0)};
+  if (!found) {
+    for (std::size_t r = 0; r < faults.is_wrong.size(); ++r) {
+      std::vector<int> component;
+      faults.is_wrong[r] = labels.components(static_cast<int>(r) + 1, component) != wanted_.regions[r].components;
+    }
+    return faults;
+  }
+  for (std::size_t r = 0; r < faults.is_wrong.size(); ++r) faults.is_wrong[r] = found->regions[r] != wanted_.regions[r];
+  faults.same_pairs = found->sheets.size() == wanted_.sheets.size();
+  for (const auto& [pair, sheet] : wanted_.sheets) {
+    const auto at = found->sheets.find(pair);
+    if (at == found->sheets.end()) {
+      faults.same_pairs = false;
+      for (const int side : pair)
+        if (side != kOutside) faults.is_wrong[static_cast<std::size_t>(side - 1)] = 1;
+    } else {
+      faults.wrong_sheets += at->second != sheet;
+    }
+  }
+  // What separates two regions that must not touch is too thin.
+  for (const auto& [pair, sheet] : found->sheets)
+    if (!wanted_.sheets.contains(pair))
+      for (std::size_t r = 0; r < faults.is_wrong.size(); ++r) {
+        const auto touches = [&](int other) {
+          const auto [low, high] = std::minmax({static_cast<int>(r) + 1, other});
+          return wanted_.sheets.contains({low, high});
+        };
+        if (touches(pair[0]) && touches(pair[1])) faults.is_wrong[r] = 1;
+      }
+  return faults;
+}
+
+bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_length, std::vector<double>& weights) {
+  constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
+  bool raised = false;
+  for (std::size_t r = 0; r < is_wrong.size(); ++r) {
+    misses_[r] += is_wrong[r] != 0;
+    if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThin * cell_length) continue;
+    weights[r + 1] *= kRaise;
+    raised = true;
+  }
+  return raised;
 }
 
 std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {

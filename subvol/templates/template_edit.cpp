@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/template_edit.h"
 
-#include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
-#include "subvol/mesh/validate.h"
 
 #include <Eigen/Geometry>
 
@@ -15,11 +13,6 @@
 namespace subvol {
 
 using namespace internal;
-
-void require_sound(const VolumeMesh& mesh, const std::string& name) {
-  for (const MeshDefect& defect : validate(mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError(name + ": " + defect.message);
-}
 
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell) {
   const CellTopology& topology = cell_topology(mesh.kinds[cell]);

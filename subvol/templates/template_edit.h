@@ -10,9 +10,6 @@ namespace subvol {
 
 /// Helpers shared by the operations that edit templates.
 
-/// Throws InputError, starting with `name`, if `validate` finds anything but unused vertices.
-void require_sound(const VolumeMesh& mesh, const std::string& name);
-
 /// True if det[n0-c, n1-c, n2-c] > 0 at every corner c of a cell, with neighbors n0, n1, n2.
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell);
 

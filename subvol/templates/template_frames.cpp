@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/template_frames.h"
 
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/plane_grid.h"
 
 #include <Eigen/Dense>
@@ -24,7 +25,7 @@ std::vector<Facet> facets_of(const TriangleMesh& surface) {
   facets.reserve(surface.triangles.size());
   for (const auto& t : surface.triangles) {
     const Vec3 &a = surface.positions[t[0]], &b = surface.positions[t[1]], &c = surface.positions[t[2]];
-    facets.push_back({(a + b + c) / 3, (b - a).cross(c - a) / 2});
+    facets.push_back({(a + b + c) / 3, doubled_area_vector(surface, t) / 2});
   }
   return facets;
 }

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/vertex_merge.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/templates/template_edit.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -153,7 +154,7 @@ VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target,
   const std::vector<char> all(merged.num_cells(), 1);
   FeatureTags tags = std::move(merged.tags);  // checked only after the cells have proved valid
   merged.tags = {};
-  require_sound(merged, name);
+  require_valid(merged, name);
   merged.tags = std::move(tags);
   merged.regions = mesh.regions;
   merged.face_groups = merged_groups(mesh.face_groups, target);
@@ -199,20 +200,14 @@ VolumeMesh glue(const VolumeMesh& mesh, double distance) {
   }
   std::stable_sort(order.begin(), order.end());
   const double reach = distance + 4e-15 * largest;  // tolerance for the rounding of heights
-  std::vector<Index> target(mesh.num_vertices());
-  std::iota(target.begin(), target.end(), 0);
-  const auto root = [&](Index v) {
-    while (target[v] != v) v = target[v];
-    return v;
-  };
+  DisjointSets merged(mesh.num_vertices());
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t j = i + 1; j < order.size() && order[j].first - order[i].first <= reach; ++j) {
       const Index v = order[i].second, w = order[j].second;
-      if (!((mesh.positions[w] - mesh.positions[v]).norm() <= distance)) continue;
-      const Index a = root(v), b = root(w);
-      target[std::max(a, b)] = std::min(a, b);
+      if ((mesh.positions[w] - mesh.positions[v]).norm() <= distance) merged.join(v, w);
     }
-  for (std::size_t v = 0; v < target.size(); ++v) target[v] = root(static_cast<Index>(v));
+  std::vector<Index> target(mesh.num_vertices());
+  for (std::size_t v = 0; v < target.size(); ++v) target[v] = merged.of(static_cast<Index>(v));
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
     if (!are_distinct(merged_corners(mesh, c, target))) {
       std::string message = "merge: two corners of cell " + std::to_string(c) + " would become one at the distance ";

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/templates/sheet.h"
+#include "subvol/templates/cell_sheet.h"
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/validate.h"
 #include "subvol/templates/template_edit.h"
 #include "subvol/templates/vertex_merge.h"
 
@@ -154,7 +155,7 @@ std::vector<Edge> sheet_edges(const MeshTopology& topology, Index v0, Index v1) 
 
 VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   if (parts < 2) throw InputError("split: a sheet must be cut into at least 2 parts, got " + std::to_string(parts));
-  require_sound(mesh, "split");
+  require_valid(mesh, "split");
   const MeshTopology topology(mesh);
   const std::vector<Edge> sheet = sheet_edges(topology, v0, v1);
   std::map<Index, Index> above;   // upper end of the sheet's edge that starts at each lower end
@@ -199,7 +200,7 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
       result.tags.creases.push_back({vertex_at(lower, k), vertex_at(lower, k + 1), crease.sharpness});
   }
   normalize_tags(result.tags);
-  require_sound(result, "split");
+  require_valid(result, "split");
   result.regions = mesh.regions;
   if (!mesh.face_groups.empty()) {
     std::vector<VertexSupport> support;
@@ -211,13 +212,13 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
 }
 
 VolumeMesh collapse_sheet(const VolumeMesh& mesh, Index v0, Index v1) {
-  require_sound(mesh, "collapse");
+  require_valid(mesh, "collapse");
   const MeshTopology topology(mesh);
   return merge_pairs(mesh, topology, sheet_edges(topology, v0, v1), false, "collapse");
 }
 
 VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1) {
-  require_sound(mesh, "collapse");
+  require_valid(mesh, "collapse");
   const MeshTopology topology(mesh);
   edge_between(topology, v0, v1);
   const std::array<Edge, 1> pair{{{v0, v1}}};
@@ -225,7 +226,7 @@ VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1) {
 }
 
 VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2) {
-  require_sound(mesh, "collapse");
+  require_valid(mesh, "collapse");
   const MeshTopology topology(mesh);
   std::vector<Edge> pairs;         // corners to join in each quad of the column, in the order of `faces`
   std::vector<Index> faces;

@@ -9,8 +9,8 @@
 
 namespace subvol {
 
-/// Returns the edges of a sheet: the edge v0-v1, the edges opposite to it across quads, the edges opposite to those,
-/// and so on. All are directed alike, from the side of the sheet that holds v0 to the side that holds v1.
+/// Returns the edges of a sheet of cells: the edge v0-v1, the edges opposite to it across quads, the edges opposite to
+/// those, and so on. All are directed alike, from the side of the sheet that holds v0 to the side that holds v1.
 ///
 ///        o---o---o        Starting from edge a-b, the sheet holds
 ///        |   |   |        all the edges drawn upright.
@@ -22,8 +22,9 @@ namespace subvol {
 /// InputError: there is no edge between v0 and v1; the sheet returns to an edge in the opposite direction.
 std::vector<std::array<Index, 2>> sheet_edges(const MeshTopology& topology, Index v0, Index v1);
 
-/// Cuts all edges of a sheet into equal parts, and its cells with them: a hex into hexes, and a prism into prisms
-/// between its triangles. Old vertices keep their numbers and positions; creases along the cut edges are cut as well.
+/// Cuts all edges of a sheet of cells into equal parts, and its cells with them: a hex into hexes, and a prism into
+/// prisms between its triangles. Old vertices keep their numbers and positions; creases along the cut edges are cut as
+/// well.
 ///
 /// parts  >= 2. The parts of a cell follow one another, with its reference.
 /// InputError: as `sheet_edges`; a sheet that crosses itself in a cell, or runs into a triangle; parts < 2; an invalid
