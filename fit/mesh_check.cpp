@@ -116,12 +116,14 @@ bool begins(const char* part, double fraction, const WorkProgress& progress, Mes
 }
 
 /// Returns a vertex of each part of a surface whose normals point into the solid that all parts bound together; none if
-/// a part is not closed.
-std::vector<Vec3> parts_facing_inward(const TriangleMesh& surface) {
+/// a part is not closed, or if cancelled.
+std::vector<Vec3> parts_facing_inward(const TriangleMesh& surface, const WorkProgress& progress, MeshCheck& check) {
   const SurfaceParts parts = surface_parts(surface);
   const TriangleMesh& mesh = parts.surface.mesh;  // without triangles that have two corners in one place
   if (parts.num_parts() < 2 || std::ranges::find(parts.is_closed, 0) != parts.is_closed.end()) return {};
-  const PartNesting nesting = part_nesting(mesh, parts.part, static_cast<int>(parts.num_parts()));
+  const PartNesting nesting = part_nesting(mesh, parts.part, static_cast<int>(parts.num_parts()),
+                                           [&] { return !begins("nesting", 0.5, progress, check); });
+  if (check.ended_early) return {};
   std::vector<Vec3> places;
   for (std::size_t p = 0; p < parts.num_parts(); ++p) {
     if (nesting.faces_out(p)) continue;
@@ -145,7 +147,9 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (check.num_boundary_components > 1 && faces.empty()) check.parts_inside_solids = parts_facing_inward(triangles);
+  if (check.num_boundary_components > 1 && faces.empty())
+    check.parts_inside_solids = parts_facing_inward(triangles, progress, check);
+  if (check.ended_early) return;
   const bool to_compare = compare && !triangles.triangles.empty();
   if (to_compare && begins("distance", 0.6, progress, check)) compare(triangles, check);
 }

@@ -34,8 +34,9 @@ struct MeshCheckOptions {
   int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< as in `SurfaceDistanceOptions`
   bool audits_subdivision = true;  ///< tell what would degrade a subdivision of the mesh
   CellLabels labels{};  ///< of curved cells, whose mesh does not hold them; empty: one region
-  /// Called before each part with its name: "quality", "topology", "self-intersections" and, if there are a target and
-  /// a boundary, "distance". Also called repeatedly during the search for self-intersections.
+  /// Called before each part with its name: "quality", "topology", "self-intersections", "nesting" if
+  /// the boundary has several parts, and, if there are a target and a boundary, "distance". Also called repeatedly
+  /// during the search for self-intersections and that of parts that lie in others.
   WorkProgress progress{};
 };
 

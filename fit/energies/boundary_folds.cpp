@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace subvol::internal {
@@ -81,10 +82,18 @@ BoundaryFolds::BoundaryFolds(const VolumeMesh& mesh) {
     offsets_.push_back(wedges_.size());
     limits_.push_back(kLeastLimit);
   }
+  sort_by_first_cell();
 }
 
 BoundaryFolds::BoundaryFolds(const BoundaryFolds& whole, std::span<const Index> cells) {
-  for (std::size_t e = 0; e < whole.size(); ++e) {
+  const auto first_cell = [&](Index e) { return whole.wedges(e).front().cell; };
+  const std::vector<Index>& all = whole.by_first_cell_;
+  std::vector<Index> near;
+  for (const Index c : cells)
+    for (auto at = std::ranges::lower_bound(all, c, {}, first_cell); at != all.end() && first_cell(*at) == c; ++at)
+      near.push_back(*at);
+  std::sort(near.begin(), near.end());
+  for (const Index e : near) {
     std::vector<Wedge> wedges(whole.wedges(e).begin(), whole.wedges(e).end());
     const bool is_inside = std::ranges::all_of(wedges, [&](Wedge& wedge) {
       const auto place = std::ranges::lower_bound(cells, wedge.cell);
@@ -97,6 +106,13 @@ BoundaryFolds::BoundaryFolds(const BoundaryFolds& whole, std::span<const Index> 
     offsets_.push_back(wedges_.size());
     limits_.push_back(whole.limits_[e]);
   }
+  sort_by_first_cell();
+}
+
+void BoundaryFolds::sort_by_first_cell() {
+  by_first_cell_.resize(size());
+  std::iota(by_first_cell_.begin(), by_first_cell_.end(), 0);
+  std::ranges::stable_sort(by_first_cell_, {}, [&](Index e) { return wedges(e).front().cell; });
 }
 
 void BoundaryFolds::want(std::span<const EdgeCap> edges, const VolumeMesh& mesh) {

@@ -61,6 +61,7 @@ class BoundaryFolds {
   Residual linearized(std::size_t edge, const VolumeMesh& mesh, std::span<const Vec3> nodes) const;
 
  private:
+  void sort_by_first_cell();
   std::span<const Wedge> wedges(std::size_t edge) const {
     return {wedges_.data() + offsets_[edge], offsets_[edge + 1] - offsets_[edge]};
   }
@@ -68,6 +69,7 @@ class BoundaryFolds {
   std::vector<std::size_t> offsets_{0};
   std::vector<Wedge> wedges_;  ///< of each edge: first that at one boundary face, last that at the other
   std::vector<double> limits_;
+  std::vector<Index> by_first_cell_;  ///< edges, by the cell of their first wedge
 };
 
 }  // namespace subvol::internal

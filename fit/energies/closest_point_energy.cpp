@@ -88,16 +88,18 @@ ClosestPointEnergy::ClosestPointEnergy(const ClosestPointEnergy& whole, std::spa
       inverse_far_(whole.inverse_far_),
       pull_(whole.pull_),
       discounts_(whole.discounts_) {
-  std::vector<std::uint8_t> is_inside(whole.triangles().size(), 0);
+  std::vector<std::size_t> hits;  // of the whole on these triangles
   surface_offsets_.push_back(0);
   for (const Index t : triangles) {
-    is_inside[t] = 1;
+    if (!whole.target_offsets_.empty())
+      for (std::size_t k = whole.target_offsets_[t]; k < whole.target_offsets_[t + 1]; ++k)
+        hits.push_back(whole.hit_of_link_[k]);
     surface_offsets_.push_back(surface_offsets_.back() + whole.surface_offsets_[t + 1] - whole.surface_offsets_[t]);
     if (!whole.groups_.empty()) groups_.push_back(whole.groups_[t]);
     if (!whole.factors_.empty()) factors_.push_back(whole.factors_[t]);
   }
-  for (std::size_t j = 0; j < whole.target_hits_.size(); ++j) {
-    if (!is_inside[whole.target_hits_[j].triangle]) continue;
+  std::sort(hits.begin(), hits.end());
+  for (const std::size_t j : hits) {
     used_.push_back(static_cast<Index>(whole.target_point(j)));
     used_points_.push_back(target_->samples()[used_.back()]);
     if (!whole.sample_groups_.empty()) sample_groups_.push_back(whole.sample_groups_[j]);
@@ -173,22 +175,24 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   target_offsets_.assign(triangles().size() + 1, 0);
   for (const auto& hit : target_hits_) ++target_offsets_[hit.triangle + 1];
   for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
-  std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1), places;
-  for (const auto& hit : target_hits_) places.push_back(next[hit.triangle]++);
+  std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1);
   target_links_.resize(points.size());
+  hit_of_link_.resize(points.size());
+  for (std::size_t j = 0; j < points.size(); ++j) hit_of_link_[next[target_hits_[j].triangle]++] = j;
 #pragma omp parallel for schedule(static)
-  for (std::size_t j = 0; j < points.size(); ++j) {
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::size_t j = hit_of_link_[k];
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
     const double distance = target_hits_[j].distance;
     const bool has_direction = straight && distance > kLeastOffset * target_->length();
-    target_links_[places[j]] = {t,
-                                barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
-                                points[j],
-                                has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)
-                                              : target_->sample_normals()[target_point(j)],
-                                factor(t) * emphasis(distance) * target_->sample_areas()[target_point(j)],
-                                tau_};
+    target_links_[k] = {t,
+                        barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
+                        points[j],
+                        has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)
+                                      : target_->sample_normals()[target_point(j)],
+                        factor(t) * emphasis(distance) * target_->sample_areas()[target_point(j)],
+                        tau_};
   }
 }
 

@@ -147,6 +147,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
   double factor(Index triangle) const { return factors_.empty() ? 1 : factors_[triangle]; }
   std::vector<Link> target_links_;               ///< ordered by sample triangle
   std::vector<std::size_t> target_offsets_;      ///< where each sample triangle begins in target_links_
+  std::vector<std::size_t> hit_of_link_;         ///< place in target_hits_ of each of target_links_
   std::vector<Link> surface_links_;              ///< ordered by sample triangle
   std::vector<std::size_t> surface_offsets_;     ///< where each sample triangle begins in surface_links_
   std::vector<ClosestPoint::Hit> surface_hits_;  ///< t(x_q)

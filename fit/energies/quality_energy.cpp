@@ -164,10 +164,12 @@ QualityEnergy::QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part,
         return lengths;
       }()) {
   weights_ = whole.weights_;
-  caps_ = whole.caps_;
+  if (!whole.caps_of_cell_.empty()) caps_of_cell_.assign(cells.size(), kNoIndex);
   for (std::size_t c = 0; c < cells.size(); ++c) {
     dense_[c] = whole.dense_[cells[c]];
-    if (!whole.caps_of_cell_.empty()) caps_of_cell_.push_back(whole.caps_of_cell_[cells[c]]);
+    if (whole.caps_of_cell_.empty() || whole.caps_of_cell_[cells[c]] == kNoIndex) continue;
+    caps_of_cell_[c] = static_cast<Index>(caps_.size());
+    caps_.push_back(whole.caps_[whole.caps_of_cell_[cells[c]]]);
   }
   if (!whole.folds_) return;
   folds_.emplace(*whole.folds_, cells);

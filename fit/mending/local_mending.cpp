@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -22,6 +23,7 @@ namespace {
 /// ends. A million of them take about 20 ms; a fault among triangles of the usual shape takes a sixth of that.
 constexpr std::size_t kMostWorkAtFault = 10'000'000, kMostWork = 500'000'000;
 constexpr std::size_t kBoxesPerPair = 100;  ///< boxes that are compared in the time of one pair
+constexpr std::size_t kRun = 64;            ///< triangles in succession along x with one box
 
 /// Mends one surface.
 class LocalMender {
@@ -32,6 +34,16 @@ class LocalMender {
     around_.resize(mesh.positions.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
       for (const Index v : mesh.triangles[t]) around_[v].push_back(static_cast<Index>(t));
+    along_x_.resize(mesh.triangles.size());
+    std::iota(along_x_.begin(), along_x_.end(), 0);
+    const auto x = [&](Index t) { return mesh.positions[mesh.triangles[t][0]].x(); };
+    std::ranges::stable_sort(along_x_, {}, x);
+    run_of_.resize(along_x_.size());
+    run_boxes_.resize((along_x_.size() + kRun - 1) / kRun);
+    for (std::size_t i = 0; i < along_x_.size(); ++i) {
+      run_of_[along_x_[i]] = i / kRun;
+      run_boxes_[i / kRun].extend(box_of(along_x_[i]));
+    }
   }
   LocalMending run();
 
@@ -59,6 +71,9 @@ class LocalMender {
   const std::function<bool()>& cancelled_;
   std::vector<Vec3> given_;
   std::vector<std::vector<Index>> around_;  ///< triangles at each vertex
+  std::vector<Index> along_x_;              ///< triangles, by where they were at first
+  std::vector<std::size_t> run_of_;         ///< of each triangle
+  std::vector<Eigen::AlignedBox3d> run_boxes_;  ///< around each run of triangles, and where they were before
   std::vector<char> is_touched_;            ///< triangles that were changed in this round
   std::size_t work_ = 0;                    ///< done so far, in pairs of triangles tested
   int num_pair_searches_ = 0;               ///< faults for which two changes at a time were tried
@@ -120,12 +135,16 @@ MendingPatch LocalMender::patch_around(const std::vector<Index>& seeds, std::vec
     boxes.emplace_back(box.min() - margin, box.max() + margin);
     patch.box.extend(boxes.back());
   }
-  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-    if (done_.is_dropped[t]) continue;
-    const Eigen::AlignedBox3d box = box_of(static_cast<Index>(t));
-    if (patch.box.intersects(box) &&
-        std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) { return b.intersects(box); }))
-      chosen.insert(static_cast<Index>(t));
+  for (std::size_t run = 0; run < run_boxes_.size(); ++run) {
+    if (!patch.box.intersects(run_boxes_[run])) continue;
+    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, along_x_.size()); ++i) {
+      const Index t = along_x_[i];
+      if (done_.is_dropped[t]) continue;
+      const Eigen::AlignedBox3d box = box_of(t);
+      if (patch.box.intersects(box) &&
+          std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) { return b.intersects(box); }))
+        chosen.insert(t);
+    }
   }
   std::map<Index, Index> number;
   for (const Index t : chosen) {
@@ -186,8 +205,11 @@ void LocalMender::accept(const MendingPatch& patch, const std::vector<MendingCha
     mesh_.triangles[t] = now;
     for (const Index v : now) around_[v].push_back(t);
   }
-  for (const Index t : touched)
-    if (!done_.is_dropped[t]) changed_.push_back(box_of(t));
+  for (const Index t : touched) {
+    if (done_.is_dropped[t]) continue;
+    changed_.push_back(box_of(t));
+    run_boxes_[run_of_[t]].extend(changed_.back());
+  }
 }
 
 bool LocalMender::is_hopeless(const std::vector<Index>& seeds) const {

@@ -17,8 +17,8 @@ namespace subvol::internal {
 
 PartUnion::PartUnion(SurfaceParts parts, const std::function<bool()>& cancelled)
     : parts_(std::move(parts)), cancelled_(cancelled), groups_(parts_.num_parts()) {
-  nesting_ = part_nesting(mesh(), parts_.part, static_cast<int>(parts_.num_parts()));
-  turn_parts_outward(parts_);
+  nesting_ = part_nesting(mesh(), parts_.part, static_cast<int>(parts_.num_parts()), cancelled);
+  turn_parts_outward(parts_, nesting_);
   triangles_of_.resize(parts_.num_parts());
   for (std::size_t t = 0; t < parts_.part.size(); ++t) triangles_of_[parts_.part[t]].push_back(static_cast<Index>(t));
 }

@@ -75,13 +75,14 @@ class Diagnostician {
   void find_vertex_contacts();
   void find_nesting();
   void find_meetings();
-  void turn_outward() { turn_parts_outward(parts_); }
+  void turn_outward() { turn_parts_outward(parts_, nesting_); }
   void find_sharp_angles();
   void find_thin_places();
 
   const std::function<bool()>& cancelled_;
   SurfaceParts parts_;
   const TriangleMesh& mesh_;
+  PartNesting nesting_;
   SurfaceDiagnosis result_;
   std::array<SurfaceFinding, kNumSurfaceFaults> findings_;
   std::vector<char> repeated_;  ///< triangles with the corners of another one
@@ -190,7 +191,9 @@ void Diagnostician::find_vertex_contacts() {
 }
 
 void Diagnostician::find_nesting() {
-  const PartNesting nesting = part_nesting(mesh_, parts_.part, static_cast<int>(parts_.num_parts()));
+  nesting_ = part_nesting(mesh_, parts_.part, static_cast<int>(parts_.num_parts()), cancelled_);
+  if (!goes_on()) return;
+  const PartNesting& nesting = nesting_;
   std::size_t closed = 0, wrong = 0;
   for (std::size_t p = 0; p < parts_.num_parts(); ++p) {
     if (!parts_.is_closed[p]) continue;

@@ -3,6 +3,7 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -29,9 +30,13 @@ struct PartNesting {
 /// part       number of the part of each triangle, in [0, count).
 /// count      number of parts; each has triangles, closed and consistently oriented. If a part has holes, its depth is
 ///            an estimate.
-/// Deterministic. Cost: that of the winding numbers at the corners and centers of 16
-/// triangles of each part whose box lies in another part's.
-PartNesting part_nesting(const TriangleMesh& mesh, std::span<const int> part, int count);
+/// cancelled  asked now and then, from the calling thread. If it returns true, some depths are missing and are 0.
+/// Empty:
+///            never.
+/// Deterministic. Cost: that of the winding numbers at the corners and centers of 16 triangles of each part whose box
+/// lies in another part's. Each point asks the closed parts whose boxes contain it, and all open ones together.
+PartNesting part_nesting(const TriangleMesh& mesh, std::span<const int> part, int count,
+                         const std::function<bool()>& cancelled = {});
 
 /// Returns the smallest part that contains another part, or -1. nesting: as `part_nesting` returns it. Cost: that of
 /// the winding numbers of each part whose box contains the other's.

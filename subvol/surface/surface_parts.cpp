@@ -2,7 +2,6 @@
 #include "subvol/surface/surface_parts.h"
 
 #include "subvol/base/disjoint_sets.h"
-#include "subvol/surface/part_nesting.h"
 
 #include <algorithm>
 #include <numeric>
@@ -70,9 +69,7 @@ std::vector<std::array<Index, 2>> edge_contacts(const SurfaceParts& parts) {
   return contacts;
 }
 
-std::size_t turn_parts_outward(SurfaceParts& parts) {
-  if (parts.num_parts() == 0) return 0;
-  const PartNesting nesting = part_nesting(parts.surface.mesh, parts.part, static_cast<int>(parts.num_parts()));
+std::size_t turn_parts_outward(SurfaceParts& parts, const PartNesting& nesting) {
   std::vector<char> turned(parts.num_parts(), 0);
   for (std::size_t p = 0; p < turned.size(); ++p) turned[p] = parts.is_closed[p] && !nesting.faces_out(p);
   for (std::size_t t = 0; t < parts.part.size(); ++t)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/surface/part_nesting.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <cstddef>
@@ -34,7 +35,8 @@ std::vector<std::array<Index, 2>> edge_contacts(const SurfaceParts& parts);
 /// Turns the closed parts whose orientation disagrees with their nesting (`part_nesting`), so that normals point out of
 /// the solid. Triangles inside a part that disagree with their neighbors are not turned.
 ///
+/// nesting  of these parts.
 /// returns  the number of parts that were turned.
-std::size_t turn_parts_outward(SurfaceParts& parts);
+std::size_t turn_parts_outward(SurfaceParts& parts, const PartNesting& nesting);
 
 }  // namespace subvol::internal
