@@ -4,7 +4,9 @@
 #include "subvol/base/disjoint_sets.h"
 
 #include <algorithm>
-#include <numeric>
+#include <array>
+#include <map>
+#include <span>
 #include <utility>
 
 namespace subvol::internal {
@@ -30,10 +32,47 @@ void sort_edges(SurfaceParts& parts) {
   });
 }
 
-/// Sets part and is_closed.
-void find_parts(SurfaceParts& parts) {
+DisjointSets joined_triangles(const SurfaceParts& parts) {
   DisjointSets sets(parts.surface.mesh.triangles.size());
   for (const auto& [i, j] : parts.joined) sets.join(parts.sides[i].triangle, parts.sides[j].triangle);
+  return sets;
+}
+
+/// Returns the sides of an edge by twos, if each two of them belong to one part that they close there; else nothing.
+/// The two sides of a fold lie on each other, and close nothing.
+std::vector<std::array<std::size_t, 2>> pairs_of_parts(const SurfaceParts& parts, std::size_t first,
+                                                       DisjointSets& sets) {
+  const std::span<const SurfaceHalfEdge> run = parts.edge(first);
+  std::map<Index, std::vector<std::size_t>> sides_of;
+  for (std::size_t i = 0; i < run.size(); ++i) sides_of[sets.of(run[i].triangle)].push_back(first + i);
+  std::vector<std::array<std::size_t, 2>> pairs;
+  for (const auto& [part, sides] : sides_of) {
+    if (sides.size() != 2 || parts.sides[sides[0]].forward == parts.sides[sides[1]].forward) return {};
+    pairs.push_back({sides[0], sides[1]});
+  }
+  for (const auto& [t, s] : contacts_at_edge(parts.surface.mesh, run))
+    if (sets.of(t) == sets.of(s)) return {};
+  return pairs;
+}
+
+/// Takes the edges at which closed parts lie on each other out of `crowded`. Angles alone do not tell how the sides
+/// belong together there; the parts do.
+void separate_parts(SurfaceParts& parts) {
+  if (parts.crowded.empty()) return;
+  DisjointSets sets = joined_triangles(parts);
+  std::erase_if(parts.crowded, [&](std::size_t first) {
+    const std::vector<std::array<std::size_t, 2>> pairs = pairs_of_parts(parts, first, sets);
+    if (pairs.empty()) return false;
+    parts.touching.push_back(first);
+    parts.joined.insert(parts.joined.end(), pairs.begin(), pairs.end());
+    return true;
+  });
+  std::ranges::sort(parts.touching);
+}
+
+/// Sets part and is_closed.
+void find_parts(SurfaceParts& parts) {
+  DisjointSets sets = joined_triangles(parts);
   std::vector<Index> numbers;
   parts.is_closed.assign(sets.number(numbers), 1);
   parts.part.assign(numbers.begin(), numbers.end());
@@ -55,6 +94,7 @@ SurfaceParts surface_parts(const TriangleMesh& surface) {
   parts.surface = welded(surface);
   parts.sides = sorted_half_edges(parts.surface.mesh.triangles, parts.surface.mesh.positions.size());
   sort_edges(parts);
+  separate_parts(parts);
   find_parts(parts);
   return parts;
 }
