@@ -181,7 +181,7 @@ RepairAttempt attempt_repair(const TriangleMesh& given, const SurfaceDiagnosis& 
   return attempt;
 }
 
-/// Repairs a surface after a change. Returns nothing unless it bounds a solid then.
+/// Repairs a surface after a change. Returns nothing if it was cancelled, or cannot be repaired.
 /// before  the repair without the change; done: what was changed.
 std::optional<SurfaceRepair> repaired_after(const TriangleMesh& changed, const SurfaceRepair& before,
                                             const std::string& done, const std::function<bool()>& cancelled,
@@ -189,7 +189,7 @@ std::optional<SurfaceRepair> repaired_after(const TriangleMesh& changed, const S
   const SurfaceDiagnosis diagnosis = diagnose(changed, cancelled);
   if (diagnosis.is_cancelled) return std::nullopt;
   RepairAttempt attempt = attempt_repair(changed, diagnosis, cancelled, rule);
-  if (!attempt.is_successful()) return std::nullopt;
+  if (!attempt.repair) return std::nullopt;
   std::vector<std::string>& all = attempt.repair->done;
   all.insert(all.begin(), "target: " + done);
   all.insert(all.begin(), before.done.begin(), before.done.end());
@@ -202,24 +202,33 @@ std::optional<SurfaceRepair> repaired_without_fins(const SurfaceRepair& before, 
   constexpr double kMostFinShare = 0.25;  // of the area
   const std::optional<SurfaceWithoutFins> rest = without_fins(before.surface);
   if (!rest || rest->area_share > kMostFinShare) return std::nullopt;
-  return repaired_after(rest->surface, before,
-                        formatted("%zu %s of fins left out, with %.3g %% of the surface's area", rest->triangles,
-                                  rest->triangles == 1 ? "triangle" : "triangles", 100 * rest->area_share),
-                        cancelled, rule);
+  std::optional<SurfaceRepair> repair =
+      repaired_after(rest->surface, before,
+                     formatted("%zu %s of fins left out, with %.3g %% of the surface's area", rest->triangles,
+                               rest->triangles == 1 ? "triangle" : "triangles", 100 * rest->area_share),
+                     cancelled, rule);
+  return repair && repair->is_fillable ? std::move(repair) : std::nullopt;
 }
 
 /// Area of the covers of a solid's holes, as a share of the surface's. The disk under half a sphere has 0.5; covers of
 /// a sheet have about its own area, and say nothing about a solid.
 constexpr double kMostCoverShare = 0.5;
 
-/// Returns the repair of a surface whose holes are covered, if it bounds a solid: covers may cross it.
+/// Returns the repair of a surface whose holes are covered, if that leaves fewer places that prevent filling: covers
+/// may cross it.
+/// diagnosis  of the surface as it was given.
 std::optional<SurfaceRepair> repaired_with_covers(const CoveredHoles& covered, const SurfaceRepair& before,
+                                                  const SurfaceDiagnosis& diagnosis,
                                                   const std::function<bool()>& cancelled, RegionRule rule) {
   if (covered.area_share > kMostCoverShare) return std::nullopt;
-  return repaired_after(covered.surface, before,
-                        formatted("%zu %s covered, with %.3g %% of the surface's area", covered.count,
-                                  covered.count == 1 ? "hole is" : "holes are", 100 * covered.area_share),
-                        cancelled, rule);
+  std::optional<SurfaceRepair> repair =
+      repaired_after(covered.surface, before,
+                     formatted("%zu %s covered, with %.3g %% of the surface's area", covered.count,
+                               covered.count == 1 ? "hole is" : "holes are", 100 * covered.area_share),
+                     cancelled, rule);
+  if (!repair || repair->is_fillable) return repair;
+  const SurfaceDiagnosis after = diagnose(repair->surface, cancelled);
+  return after.is_cancelled || num_obstacles(after) >= num_obstacles(diagnosis) ? std::nullopt : std::move(repair);
 }
 
 /// Returns the edge length of the smallest cells that `auto_templates` tries if so many are wanted.
@@ -252,12 +261,13 @@ SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& c
     if (std::optional<SurfaceRepair> repair = repaired_without_fins(before, cancelled, rule)) return std::move(*repair);
   const SurfaceFinding* holes = diagnosis.find(SurfaceFault::open_rim);
   std::optional<CoveredHoles> covered;
+  std::optional<SurfaceRepair> without_holes;
   if (holes) covered = cover_holes(before.surface);
-  if (covered)
-    if (std::optional<SurfaceRepair> repair = repaired_with_covers(*covered, before, cancelled, rule))
-      return std::move(*repair);
+  if (covered) without_holes = repaired_with_covers(*covered, before, diagnosis, cancelled, rule);
+  if (without_holes && without_holes->is_fillable) return std::move(*without_holes);
   if (rule != RegionRule::keep && needs_wrap(attempt.repair ? &attempt.repair->surface : nullptr, diagnosis))
     if (std::optional<SurfaceRepair> repair = wrapped_to_fill(given, diagnosis, cancelled)) return std::move(*repair);
+  if (without_holes) return std::move(*without_holes);
   if (!attempt.repair) std::rethrow_exception(attempt.error);
   if (covered && covered->area_share > kMostCoverShare)
     throw InputError(

@@ -41,7 +41,7 @@ struct SurfaceRepair {
 /// If the surface bounds no solid then, three things are tried, in this order:
 /// - fins are left out (`without_fins`) if they have at most a quarter of the area and the rest bounds a solid;
 /// - holes are covered (`cover_holes`) if the covers have at most half of the surface's area and it bounds a solid with
-///   them; covers are in no group;
+///   them; covers are in no group. If crossings are left, and the surface is not wrapped either, it is still covered;
 /// - the surface is wrapped (`wrapped_to_fill`) if it has edges of three triangles, or parts that cross and cannot be
 ///   united, unless RegionRule::keep is given.
 ///

@@ -13,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -37,6 +38,16 @@ TriangleMesh folded_cube(double share) {
   return cube;
 }
 
+/// A cube whose upper side has a spike through the lower one.
+TriangleMesh spiked_cube() {
+  TriangleMesh cube = cube_surface(4, false);
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : cube.positions) box.extend(p);
+  for (Vec3& p : cube.positions)
+    if ((p - Vec3(box.center().x(), box.center().y(), box.max().z())).norm() < 1e-9) p.z() -= 1.2 * box.sizes().z();
+  return cube;
+}
+
 }  // namespace
 
 TEST_CASE("A fold of a thousandth of a triangle is mended before a surface is filled", "[mending]") {
@@ -51,12 +62,7 @@ TEST_CASE("A fold of a thousandth of a triangle is mended before a surface is fi
 }
 
 TEST_CASE("A spike through the opposite side is left and told", "[mending][slow]") {
-  TriangleMesh cube = cube_surface(4, false);
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : cube.positions) box.extend(p);
-  for (Vec3& p : cube.positions)
-    if ((p - Vec3(box.center().x(), box.center().y(), box.max().z())).norm() < 1e-9) p.z() -= 1.2 * box.sizes().z();
-  const SurfaceRepair repair = repair_surface(cube);
+  const SurfaceRepair repair = repair_surface(spiked_cube());
   CHECK_FALSE(repair.is_fillable);
   CHECK_FALSE(repair.notes.empty());
 }
@@ -113,6 +119,54 @@ TEST_CASE("A plane hole gets a plane cover before a surface is filled", "[mendin
   CHECK(internal::signed_volume_of(repair.surface) == Approx(8));
   REQUIRE(repair.done.size() == 1);
   CHECK(repair.done[0] == "target: 1 hole is covered, with 20 % of the surface's area");
+}
+
+TEST_CASE("A hole is covered also if a crossing elsewhere is left", "[mending][slow]") {
+  TriangleMesh cube = spiked_cube();
+  std::erase_if(cube.triangles, [&](const auto& t) {
+    return std::ranges::all_of(t, [&](Index v) { return cube.positions[v].x() < -1 + 1e-9; });
+  });
+  REQUIRE(diagnose(cube).find(SurfaceFault::open_rim));
+  const SurfaceRepair repair = repair_surface(cube);
+  CHECK_FALSE(repair.is_fillable);
+  CHECK_FALSE(diagnose(repair.surface).find(SurfaceFault::open_rim));
+  REQUIRE(repair.done.size() == 1);
+  CHECK_THAT(repair.done[0], Catch::Contains("1 hole is covered"));
+}
+
+TEST_CASE("Closed parts that lie on each other and have edges in common are united", "[mending]") {
+  // A box on another one, whose faces there have other diagonals, and a tet in a corner of a box.
+  const auto box = [](const Vec3& low, const Vec3& high, bool other_diagonals) {
+    TriangleMesh mesh;
+    for (int v = 0; v < 8; ++v)
+      mesh.positions.emplace_back(v & 1 ? high.x() : low.x(), v & 2 ? high.y() : low.y(), v & 4 ? high.z() : low.z());
+    for (const auto& [a, b, c, d] : std::vector<std::array<Index, 4>>{
+             {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+      if (other_diagonals)
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, d}, {b, c, d}});
+      else
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {a, c, d}});
+    }
+    return mesh;
+  };
+  const auto add = [](TriangleMesh& mesh, const TriangleMesh& more) {
+    const auto first = static_cast<Index>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), more.positions.begin(), more.positions.end());
+    for (const auto& [a, b, c] : more.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
+  };
+  TriangleMesh stack = box({0, 0, 0}, {1, 1, 1}, false);
+  add(stack, box({0, 0, 1}, {1, 1, 3}, true));
+  TriangleMesh corner = box({0, 0, 0}, {1, 1, 1}, false);
+  add(corner, {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 3, 2}, {0, 1, 3}, {1, 2, 3}}});
+  for (const auto& [surface, volume] : {std::pair(stack, 3.0), std::pair(corner, 1.0)}) {
+    CAPTURE(volume);
+    REQUIRE(diagnose(surface).find(SurfaceFault::face_contact));
+    const SurfaceRepair repair = repair_surface(surface);
+    CHECK(repair.is_fillable);
+    CHECK_FALSE(repair.regions);
+    CHECK(diagnose(repair.surface).is_fillable());
+    CHECK(internal::signed_volume_of(repair.surface) == Approx(volume));
+  }
 }
 
 TEST_CASE("A sheet is refused, and the message says what can be made of it", "[mending]") {
