@@ -474,6 +474,27 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 10 * 8);
 }
 
+TEST_CASE("A key of a file of options that means nothing is refused with its line, whichever table it is in", "[cli]") {
+  const Workplace place(subvol::samples::bracket_sample());
+  const std::string grid = "template grid --box 0 0 0 1 1 1 --counts 1 1 1 -o grid.mesh --force --config a.toml";
+  const auto refuses = [&](const std::string& text, const std::string& message) {
+    place.file("a.toml", text);
+    const Run run = place.run(grid);
+    CAPTURE(text, run.err);
+    CHECK(run.status == 2);
+    CHECK(run.err.find(message) != std::string::npos);
+  };
+  refuses("quiet = true\n\nlevles = 2\n", "a.toml:3: template grid has no option 'levles'");
+  refuses("[fit]\ncells = 300\n# more\nlevles = 2\n", "a.toml:4: fit has no option 'levles'");
+  refuses("[template.grid]\ncounts = [1,\n1,\n1]\nlevels = 2\n", "a.toml:5: template grid has no option 'levels'");
+  refuses("[template]\nquiet = true\n", "a.toml:2: template has no option 'quiet': expected a table of a verb below");
+  refuses("[fti]\ncells = 300\n", "a.toml:2: there is no verb 'fti'");
+  refuses("[template.gird]\nquiet = true\n", "a.toml:2: there is no verb 'template gird'");
+  refuses("margin = 1\n[template.grid]\nmargin = 2\n", "a.toml:3: 'margin' stands there a second time");
+  place.file("a.toml", "[fit]\ncells = 300\n[template.auto]\ncells = 50\n[template.grid]\nquiet = true\n");
+  CHECK(place.run(grid).status == 0);
+}
+
 TEST_CASE("Every verb explains itself", "[cli][slow]") {
   const Workplace place;
   const Run all = place.run("--help");
