@@ -39,13 +39,9 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Refuses, before the work, outputs to which no curved mesh can be written; the template's cells represent the result.
-void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
-                       const VolumeMesh& cells) {
+void refuse_impossible(const std::vector<Output>& outputs, const VolumeMesh& cells, int order) {
   internal::require_no_pyramids(cells.kinds, "template mesh: pyramids cannot be curved");
-  for (const Output& output : outputs) {
-    require_for_curved_cells(output, arguments.fit.order);
-    if (output.extension == ".msh") msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
-  }
+  for (const Output& output : outputs) require_for_curved_cells(output, kind_orders(cells.kinds, order));
 }
 
 /// seconds: the part of the time limit that has been used.
@@ -131,7 +127,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
                                          : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
   if (arguments.template_mesh.path.empty()) {  // made templates consist of hexes, and making one takes minutes
-    refuse_impossible(outputs, arguments, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})));
+    refuse_impossible(outputs, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})), arguments.fit.order);
     repair_to_fill(target, arguments.template_fit.regions, warnings);
     require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
   }
@@ -146,7 +142,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   tell_warnings();
   if (loaded.made && !arguments.run.quiet) std::cerr << template_text(*loaded.made);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
-  refuse_impossible(outputs, arguments, template_mesh);
+  refuse_impossible(outputs, template_mesh,
+                    std::max(arguments.fit.order, loaded.curved ? loaded.curved->space.max_order() : 1));
   require_regions(outputs, regions_of(template_mesh));
   if (loaded.curved && is_cloud(target))
     throw UsageError(arguments.template_mesh.path + ": curved cells are drawn to a surface, not to points");
