@@ -85,7 +85,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;
   writing.options = options_of_result(verb);
-  std::vector<std::string> warnings = unused_scene_options(verb, outputs);
+  std::vector<std::string> warnings = unused_output_options(verb, outputs);
   int status = kDone;
   require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);

@@ -117,7 +117,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   std::vector<Output> outputs =
       checked_outputs(arguments.run, {Part::cutaway, Part::animation, Part::boundary, Part::region});
   apply_resources(arguments.run);
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = unused_output_options(verb, outputs);
   std::size_t told = 0;
   const auto tell_warnings = [&] {
     for (; !arguments.run.quiet && told < warnings.size(); ++told)
@@ -126,6 +126,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   Target target = arguments.takes_points ? load_target_with_regions(arguments.target, warnings)
                                          : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
+  if (const auto* surface = std::get_if<TriangleMesh>(&target)) warn_of_missing_groups(verb, *surface, warnings);
   if (arguments.template_mesh.path.empty()) {  // made templates consist of hexes, and making one takes minutes
     refuse_impossible(outputs, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})), arguments.fit.order);
     repair_to_fill(target, arguments.template_fit.regions, warnings);

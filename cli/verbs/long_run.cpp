@@ -17,7 +17,7 @@ void LongRun::prepare(const std::vector<Part>& parts) {
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
-  add_warnings(unused_scene_options(verb_, outputs_));
+  add_warnings(unused_output_options(verb_, outputs_));
 }
 
 bool LongRun::precedes_result(std::string_view stage) {

@@ -474,6 +474,19 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 10 * 8);
 }
 
+TEST_CASE("Options that have no effect beside others or on the target are told", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(kFit + "--levels 1 --max-iterations 1 --keep-groups --lambda-far 0.001 -o out.mesh");
+  CAPTURE(run.err);
+  CHECK(run.err.find("--keep-groups has no effect: the target's faces have no borders") != std::string::npos);
+  CHECK(run.err.find("--lambda-far 0.001 has no effect: it is below --lambda-close, 0.005") != std::string::npos);
+  std::string points;
+  for (int i = 0; i < 64; ++i)
+    points += std::to_string(i % 4) + " " + std::to_string(i / 4 % 4) + " " + std::to_string(i / 16) + "\n";
+  place.file("points.xyz", points);
+  CHECK(place.run("fit points.xyz --template template.mesh --keep-groups -o out.vtu").status == 2);
+}
+
 TEST_CASE("A key of a file of options that means nothing is refused with its line, whichever table it is in", "[cli]") {
   const Workplace place(subvol::samples::bracket_sample());
   const std::string grid = "template grid --box 0 0 0 1 1 1 --counts 1 1 1 -o grid.mesh --force --config a.toml";
