@@ -45,7 +45,8 @@ Content content_of(const std::filesystem::path& path, std::vector<std::string>& 
   if (is_surface_or_points(path)) {
     if (is_point_cloud_file(path))
       throw InputError(path.string() +
-                       ": it holds points without faces, which only fit and check can use; expected a surface");
+                       ": it holds points without faces, which serve only as the target of `fit --template` and "
+                       "`check --target`; expected a mesh or a surface");
     return read_polygon_mesh(path, &warnings);
   }
   if (holds_exact_map(path)) return ExactMap{};

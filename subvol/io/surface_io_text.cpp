@@ -101,6 +101,10 @@ constexpr SkippedObj kSkippedObj[] = {{"vt", "texture coordinates"},
                                       {"shadow_obj"},
                                       {"trace_obj"}};
 
+/// Keywords of OBJ's free-form curves and surfaces.
+constexpr std::string_view kFreeFormObj[] = {"cstype", "deg",  "bmat", "step", "curv", "curv2", "surf",  "parm",
+                                             "trim",   "hole", "scrv", "sp",   "end",  "con",   "ctech", "stech"};
+
 /// The keywords of OBJ that name what the faces after them belong to, in order of preference.
 struct ObjNaming {
   std::string_view keyword;
@@ -185,6 +189,8 @@ class ObjParser {
       if (*keyword == kObjNamings[i].keyword) return names_[i].begin(rest_of(words));
     const auto* skipped = std::find_if(std::begin(kSkippedObj), std::end(kSkippedObj),
                                        [&](const SkippedObj& s) { return s.keyword == *keyword; });
+    if (std::ranges::find(kFreeFormObj, *keyword) != std::end(kFreeFormObj))
+      scan_.fail("free-form curves and surfaces (" + in_quotes(*keyword) + ") are not read; export polygons", line_);
     if (skipped == std::end(kSkippedObj)) scan_.fail("unknown OBJ keyword " + in_quotes(*keyword), line_);
     if (skipped->missed) left_out_.add(skipped->missed);
   }

@@ -222,6 +222,7 @@ TEST_CASE("Points are fitted and checked one way, and what makes no sense with t
   refused("optimize template.mesh --target points.xyz -o no.mesh", 3, "points without faces");
   refused("optimize template.mesh --order 2 --target points.xyz -o no.vtu", 3, "points without faces");
   refused("template auto points.xyz -o no.mesh", 3, "points without faces");
+  refused("check points.xyz", 3, "only as the target of `fit --template` and `check --target`");
 }
 
 TEST_CASE("A template with a few inverted cells is untangled before a fit, a mirrored one is refused", "[cli][slow]") {

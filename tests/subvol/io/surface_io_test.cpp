@@ -404,6 +404,11 @@ TEST_CASE("surfaces without extent, or whose areas leave the range of a double, 
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e39 0 0\n0 1e39 0\n3 0 1 2\n").triangles.size() == 1);
 }
 
+TEST_CASE("free-form surfaces of .obj are refused as what they are") {
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\ncstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 3\nend\n";
+  CHECK_THAT(surface_refusal("a.obj", text), Contains(":4: free-form curves and surfaces ('cstype') are not read"));
+}
+
 TEST_CASE("variants of .off are read, or refused as what they are") {
   const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n", faces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
   for (const std::string header : {"OFF 4 4 6\n", "OFF\n4 4\n", "OFF\n4 4\n6\n", "OFF # all\n4 4 6 # of it\n",
