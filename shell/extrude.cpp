@@ -19,6 +19,7 @@ VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options) {
     throw InputError("extrude: the thickness must be finite and above 0");
   if (options.layers < 1) throw InputError("extrude: there must be at least one layer");
   const ShellLayers layers = make_layers(surface, 0, options.layers, options.growth);
+  require_visible_layers("extrude", surface, options.thickness, options.layers, options.growth);
   std::vector<Vec3> directions;
   if (options.direction) {
     const double length = options.direction->norm();

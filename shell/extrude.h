@@ -25,9 +25,9 @@ struct ExtrudeOptions {
 ///          reversed orientation, the top, and walls along the surface's border, whose edges become creases. If the
 ///          surface has groups, its faces keep them, and the top and the walls get groups as a shell's
 ///          (`shell_groups`).
-/// InputError: options out of range; whatever `make_layers` rejects; without a direction, a vertex from which no
-/// direction sees the front of all adjacent faces; an inverted cell in the result, for example because faces look away
-/// from the direction.
+/// InputError: options out of range; layers that vanish beside the surface; whatever `make_layers` rejects; without a
+/// direction, a vertex from which no direction sees the front of all adjacent faces; an inverted cell in the result,
+/// for example because faces look away from the direction.
 VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options);
 
 }  // namespace subvol

@@ -73,6 +73,7 @@ class ShellMaker {
   void find_planes();
   void find_directions();
   void find_thickness();
+  void require_visible_thickness() const;
   void start();
   void optimize();
   std::vector<std::uint8_t> fixed_vertices() const;
@@ -333,7 +334,17 @@ void ShellMaker::optimize() {
   report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";
 }
 
+void ShellMaker::require_visible_thickness() const {
+  const std::vector<double>& thickness = options_.vertex_thickness;
+  const auto thinnest = std::min_element(thickness.begin(), thickness.end());
+  std::string owner = "shell";
+  if (!thickness.empty()) owner += ": at " + text_of(std::array{static_cast<Index>(thinnest - thickness.begin())});
+  require_visible_layers(owner.c_str(), given_, thickness.empty() ? options_.thickness : *thinnest, options_.layers,
+                         options_.growth);
+}
+
 ShellResult ShellMaker::run(const PolygonMesh& surface) {
+  require_visible_thickness();
   cells_.tags = shell_tags(layers_, options_.tags);
   begin_with("directions", 0, &ShellMaker::find_directions);
   begin_with("thickness", 0.02, &ShellMaker::find_thickness);

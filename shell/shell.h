@@ -80,9 +80,10 @@ struct ShellResult {
 /// returns  for every surface that is not rejected, a shell with certified cells and sheets that do not intersect,
 ///          except for rounding if the caller's coordinates are much larger than the surface; `failures` is decisive.
 ///          Only the report if the caller cancels before there is a shell.
-/// InputError: options out of range; whatever `make_layers` rejects; a surface that intersects itself; vertices from
-/// which no direction sees the front of all adjacent faces, or on which not even a very thin layer fits. Messages tell
-/// how many there are, and the coordinates of the first ten. Same bits for any number of threads.
+/// InputError: options out of range; layers that vanish beside the surface (`require_visible_layers`); whatever
+/// `make_layers` rejects; a surface that intersects itself; vertices from which no direction sees the front of all
+/// adjacent faces, or on which not even a very thin layer fits. Messages tell how many there are, and the coordinates
+/// of the first ten. Same bits for any number of threads.
 ShellResult make_shell(const PolygonMesh& surface, const ShellOptions& options);
 
 }  // namespace subvol

@@ -136,6 +136,22 @@ int number_of_layers(double thickness, double first_height, double growth) {
                              "the thickness of %.6g", first_height, growth, total, thickness));
 }
 
+void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,
+                            double growth) {
+  constexpr double kLeastShare = 1e-13;
+  double largest = 0;
+  for (const Vec3& p : surface.positions) largest = std::max(largest, p.lpNorm<Eigen::Infinity>());
+  const double least = kLeastShare * largest;
+  const double first = layer_shares(num_layers, growth)[1] * thickness;
+  const double thinnest = first * std::min(1.0, std::pow(growth, num_layers - 1));
+  const std::string expected = formatted(" vanishes beside the surface; expected at least %.3g", least);
+  if (thickness < least) throw InputError(formatted("%s: thickness %.6g", owner, thickness) + expected);
+  if (thinnest < least)
+    throw InputError(formatted("%s: growth %.6g makes the thinnest of %d layers %.3g thick, which", owner, growth,
+                               num_layers, thinnest) +
+                     expected);
+}
+
 ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth, const SurfaceNames& names) {
   require_faces(surface, names);
   require_numberable(surface, inside, outside);

@@ -73,6 +73,14 @@ double growth_of_layers(double thickness, double first_height, int num_layers);
 /// thick as the one before. InputError: as above, or growth < 1 and a thickness that no number of layers reaches.
 int number_of_layers(double thickness, double first_height, double growth);
 
+/// Refuses layers that vanish beside the surface: the thinnest must have at least 1e-13 of the surface's largest
+/// coordinate, since coordinates are rounded to 2e-16 of it.
+/// owner      name of the function that makes the layers, for the message.
+/// thickness  of all layers together, > 0.
+/// InputError: a thinner layer, or as `layer_shares`.
+void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,
+                            double growth);
+
 /// Pairs the surface's edges and checks the requirements of a shell.
 ///
 /// names  numbers for messages; those of faces and vertices are followed by coordinates.

@@ -9,6 +9,7 @@
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/target/region_matching.h"
+#include "subvol/io/label_grid_io.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
@@ -44,7 +45,8 @@ Content content_of(const std::filesystem::path& path, std::vector<std::string>& 
   if (is_surface_or_points(path)) {
     if (is_point_cloud_file(path))
       throw InputError(path.string() +
-                       ": it holds points without faces, which only fit and check can use; expected a surface");
+                       ": it holds points without faces, which serve only as the target of `fit --template` and "
+                       "`check --target`; expected a mesh or a surface");
     return read_polygon_mesh(path, &warnings);
   }
   if (holds_exact_map(path)) return ExactMap{};
@@ -119,9 +121,13 @@ bool is_surface_file(const std::filesystem::path& path) {
 
 void require_known_file(const std::filesystem::path& path) {
   if (is_nodal_extension(path) || is_surface_or_points(path)) return;
-  throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +
-                   "; of cells there are " + cell_formats() + "; of surfaces " + surface_formats() + "; of points " +
-                   point_cloud_formats());
+  if (is_label_grid_file(path))
+    throw InputError(path.string() +
+                     ": a segmentation, which only `fit` and `template auto` can use, and only as what "
+                     "they fill");
+  throw InputError(path.string() + ": " + unknown_extension(path) + "; expected cells: " + volume_mesh_formats() +
+                   "; a surface: " + surface_formats() + "; points: " + point_cloud_formats() +
+                   " (`subvol formats` says more)");
 }
 
 LoadedMesh load_mesh(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
@@ -221,8 +227,7 @@ VolumeMesh labels_of(const HighOrderFile& file) {
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
   Content content = cells_in(path, warnings, check, references);
-  if (!std::holds_alternative<VolumeMesh>(content))
-    refuse_curved(path, "linear cells are wanted: " + volume_mesh_formats());
+  if (!std::holds_alternative<VolumeMesh>(content)) refuse_curved(path, "linear cells are wanted");
   return as_chosen(std::get<VolumeMesh>(std::move(content)), references);
 }
 

@@ -65,9 +65,9 @@ Output parse_output(const std::string& text) {
     return output;
   }
   const FileFormat* format = format_of_extension(output.extension);
-  if (!format || format->written.empty()) {
-    throw UsageError("-o " + text + ": the extension must be one of " + output_formats());
-  }
+  if (!format || format->written.empty())
+    throw UsageError("-o " + text + ": " + (format ? output.extension + " is read, not written; " : "") +
+                     "the extension must be one of " + output_formats());
   if ((output.part == Part::cutaway || output.part == Part::animation) && !output.is_scene())
     throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf" +
                      (output.part == Part::animation ? ", or .html for a page" : ""));

@@ -3,7 +3,6 @@
 
 #include "cli/runs/exit_status.h"
 #include "subvol/base/format.h"
-#include "subvol/export/cell_text.h"
 #include "subvol/export/read_back.h"
 #include "subvol/export/volume_writer.h"
 #include "subvol/fit/stages/fit_report.h"
@@ -210,20 +209,15 @@ void take_figures(const CurvedShell& curved, ShellResult& shell) {
 }
 
 void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surface, int order) {
+  std::vector<CellKind> kinds;
+  for (std::size_t f = 0; f < surface.num_faces(); ++f)
+    kinds.push_back(surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex);
   for (const Output& output : outputs) {
     if (output.part == Part::cage) continue;
     if (output.extension == ".usda")
       throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
                        output.path.string());
-    require_for_curved_cells(output, order);
-    if (output.extension != ".msh") continue;
-    for (std::size_t f = 0; f < surface.num_faces(); ++f) {
-      const CellKind kind =
-          surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex;
-      if (order > max_gmsh_order(kind))
-        throw UsageError(output.path.string() + ": Gmsh evaluates a " + cell_topology(kind).name + " up to order " +
-                         std::to_string(max_gmsh_order(kind)) + " only; take .vtu");
-    }
+    require_for_curved_cells(output, kind_orders(kinds, order));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/animation.h"
 #include "subvol/export/boundary_file.h"
+#include "subvol/export/cell_text.h"
 #include "subvol/export/export.h"
 #include "subvol/export/gltf_writer.h"
 #include "subvol/export/obj_writer.h"
@@ -188,12 +189,34 @@ void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const H
   require_written(output.path, mesh, options);
 }
 
-void require_for_curved_cells(const Output& output, int order) {
+KindOrders kind_orders(std::span<const CellKind> kinds, int order) {
+  KindOrders orders{};
+  for (const CellKind kind : kinds) orders[static_cast<std::size_t>(kind)] = order;
+  return orders;
+}
+
+KindOrders kind_orders(const ElementSpace& space) {
+  KindOrders orders{};
+  for (std::size_t c = 0; c < space.num_cells(); ++c) {
+    int& largest = orders[static_cast<std::size_t>(space.kind(c))];
+    largest = std::max(largest, space.pattern_order(space.pattern(c)));
+  }
+  return orders;
+}
+
+void require_for_curved_cells(const Output& output, const KindOrders& orders) {
+  const std::string file = output.path.string();
   if (output.extension == ".usda")
-    throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
-  if (output.format().holds_cells && output.format().has_quadratic_cells_at_most() && order > 2)
+    throw UsageError(file + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+  const int most = *std::ranges::max_element(orders);
+  if (output.format().holds_cells && output.format().has_quadratic_cells_at_most() && most > 2)
     throw UsageError(formatted("%s: cells of this format have order 2 at most, not %d; take .vtu, .msh or .mfem",
-                               output.path.string().c_str(), order));
+                               file.c_str(), most));
+  if (output.extension != ".msh") return;
+  for (std::size_t kind = 0; kind < orders.size(); ++kind)
+    if (const int limit = max_gmsh_order(static_cast<CellKind>(kind)); orders[kind] > limit)
+      throw UsageError(formatted("%s: Gmsh evaluates a %s up to order %d, not %d; take .vtu or .mfem", file.c_str(),
+                                 cell_topology(static_cast<CellKind>(kind)).name, limit, orders[kind]));
 }
 
 bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
@@ -244,7 +267,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
   if (output.part == Part::region) return write_region(output, file, options);
   const HighOrderMesh& mesh = file.mesh;
-  require_for_curved_cells(output, mesh.space.max_order());
+  require_for_curved_cells(output, kind_orders(mesh.space));
   if (output.part == Part::boundary && output.extension == ".xdmf")
     return write_xdmf_faces(output, written_nodes(mesh, output.extension, file_options(file, {}, options)));
   if (output.part == Part::boundary || (!output.is_volume() && !output.is_scene())) {

@@ -7,10 +7,12 @@
 #include "subvol/export/high_order_file.h"
 #include "subvol/export/scene.h"
 #include "subvol/export/tessellate.h"
+#include "subvol/mesh/cell_topology.h"
 #include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -61,9 +63,15 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 /// quality (.glb, .gltf) or as quads (.obj), or a cutaway. UsageError: .usda, which holds subdivision cages.
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
 
-/// UsageError, to be raised before the work: curved cells of this order cannot be written to such a file: none to
-/// .usda, and none above order 2 to formats of quadratic cells.
-void require_for_curved_cells(const Output& output, int order);
+/// Largest order of each kind of cells of a mesh; 0 if it has none of the kind.
+using KindOrders = std::array<int, kNumCellKinds>;
+/// Returns these orders if all cells have one order, or each its own.
+KindOrders kind_orders(std::span<const CellKind> kinds, int order);
+KindOrders kind_orders(const ElementSpace& space);
+
+/// UsageError, to be raised before the work: curved cells of these orders cannot be written to such a file: none to
+/// .usda, none above order 2 to formats of quadratic cells, and none to .msh that Gmsh does not evaluate.
+void require_for_curved_cells(const Output& output, const KindOrders& orders);
 
 /// Writes a limit surface's quads as .obj or .usda.
 void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options);

@@ -72,6 +72,7 @@ void AutomaticFitRun::load() {
     throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   SurfaceRepair repair = load_to_fill(arguments_.target, {arguments_.fit.regions, arguments_.wrap_percent}, warnings_);
   target_ = std::move(repair.surface);
+  warn_of_missing_groups(verb_, target_, warnings_);
   regions_ = std::move(repair.regions);
   if (regions_) outer_ = outer_surface(*regions_);
   require_regions(outputs_, regions_ ? regions_->regions : std::vector<Group>{});

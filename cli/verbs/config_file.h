@@ -15,6 +15,8 @@ CLI::Validator regular_file();
 /// verb.
 ///
 /// Sections of other verbs are skipped, so that one file can serve several. The command line overrides the file.
+/// UsageError, with the file, the line and the key: a key that its verb does not have, also in the section of another
+/// verb; a section of no verb; a key that stands in two places.
 class VerbConfig : public CLI::ConfigTOML {
  public:
   explicit VerbConfig(const CLI::App& app) : app_(app) {}

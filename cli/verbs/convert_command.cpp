@@ -46,7 +46,7 @@ void convert_volume(const ConvertArguments& arguments, VolumeMesh mesh, std::vec
 int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& file, std::vector<Output>& outputs,
                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
-  for (const Output& output : outputs) require_for_curved_cells(output, file.mesh.space.max_order());
+  for (const Output& output : outputs) require_for_curved_cells(output, kind_orders(file.mesh.space));
   const Marks marks = marks_of(file);
   warn_of_losses(marks, marks, outputs, warnings, true);
   warn_of_names(marks, outputs, warnings);
@@ -85,7 +85,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;
   writing.options = options_of_result(verb);
-  std::vector<std::string> warnings = unused_scene_options(verb, outputs);
+  std::vector<std::string> warnings = unused_output_options(verb, outputs);
   int status = kDone;
   require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);

@@ -121,6 +121,12 @@ class FitRun : public CageRun {
 void FitRun::load() {
   target_ = load_target_with_regions(arguments_.target, warnings_);
   require_fitting_options(verb_, is_cloud(target_));
+  if (const auto* surface = std::get_if<TriangleMesh>(&target_)) warn_of_missing_groups(verb_, *surface, warnings_);
+  if (verb_.count("--lambda-far") > 0 && arguments_.fit.lambda_far < arguments_.fit.lambda_close)
+    warnings_.push_back(
+        internal::formatted("--lambda-far %g has no effect: it is below --lambda-close, %g, from which the weight "
+                            "would be raised",
+                            arguments_.fit.lambda_far, arguments_.fit.lambda_close));
   if (arguments_.template_mesh.path.empty()) {
     repair_to_fill(target_, template_options(arguments_).regions, warnings_);
     // Checked before minutes are spent on making one.

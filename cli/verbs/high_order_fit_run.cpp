@@ -36,13 +36,9 @@ namespace subvol::cli {
 namespace {
 
 /// Refuses, before the work, outputs to which no curved mesh can be written; the template's cells represent the result.
-void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
-                       const VolumeMesh& cells) {
+void refuse_impossible(const std::vector<Output>& outputs, const VolumeMesh& cells, int order) {
   internal::require_no_pyramids(cells.kinds, "template mesh: pyramids cannot be curved");
-  for (const Output& output : outputs) {
-    require_for_curved_cells(output, arguments.fit.order);
-    if (output.extension == ".msh") msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
-  }
+  for (const Output& output : outputs) require_for_curved_cells(output, kind_orders(cells.kinds, order));
 }
 
 /// Adds lambda, whose default depends on the template.
@@ -93,9 +89,10 @@ void HighOrderFitRun::load_target() {
   target_ = arguments_.takes_points ? load_target_with_regions(arguments_.target, warnings_)
                                     : Target(load_surface(arguments_.target, warnings_));
   require_fitting_options(verb_, is_cloud(target_));
+  if (const auto* surface = std::get_if<TriangleMesh>(&target_)) warn_of_missing_groups(verb_, *surface, warnings_);
   if (!arguments_.template_mesh.path.empty()) return;
   // Made templates consist of hexes, and making one takes minutes.
-  refuse_impossible(outputs_, arguments_, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})));
+  refuse_impossible(outputs_, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})), arguments_.fit.order);
   repair_to_fill(target_, arguments_.template_fit.regions, warnings_);
   require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
 }
@@ -116,7 +113,8 @@ void HighOrderFitRun::prepare_template() {
 }
 
 void HighOrderFitRun::require_fitting_template() const {
-  refuse_impossible(outputs_, arguments_, template_.mesh);
+  refuse_impossible(outputs_, template_.mesh,
+                    std::max(arguments_.fit.order, template_.curved ? template_.curved->space.max_order() : 1));
   require_regions(outputs_, regions_of(template_.mesh));
   if (!template_.curved) return;
   const std::string& path = arguments_.template_mesh.path;
@@ -250,7 +248,7 @@ void HighOrderFitRun::summarize() const {
 }
 
 int HighOrderFitRun::run() {
-  check_outputs({Part::cutaway, Part::animation, Part::boundary, Part::region});
+  prepare({Part::cutaway, Part::animation, Part::boundary, Part::region});
   timed("read", &HighOrderFitRun::load_target);
   timed(arguments_.untangles ? "untangle" : "template", &HighOrderFitRun::prepare_template);
   if (template_.mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet

@@ -12,16 +12,12 @@
 
 namespace subvol::cli {
 
-void LongRun::check_outputs(const std::vector<Part>& parts) {
+void LongRun::prepare(const std::vector<Part>& parts) {
   if (run_.outputs.empty() && run_.report.empty())
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
-}
-
-void LongRun::prepare(const std::vector<Part>& parts) {
-  check_outputs(parts);
-  add_warnings(unused_scene_options(verb_, outputs_));
+  add_warnings(unused_output_options(verb_, outputs_));
 }
 
 bool LongRun::precedes_result(std::string_view stage) {

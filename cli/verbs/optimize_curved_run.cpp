@@ -24,7 +24,7 @@ CurvedOptimizeRun::CurvedOptimizeRun(const OptimizeArguments& arguments, const L
   for (const char* option : {"--sizes", "--crease-angle", "--tolerance", "--max-tolerance", "--lambda"})
     if (verb_.count(option) > 0)
       throw UsageError(std::string(option) + ": not for curved cells without --target, whose boundary keeps its shape");
-  for (const Output& output : outputs_) require_for_curved_cells(output, file_.mesh.space.max_order());
+  for (const Output& output : outputs_) require_for_curved_cells(output, kind_orders(file_.mesh.space));
   require_regions(outputs_, regions_of(labels_of(file_)));
   warn_of_losses(marks_of(file_), marks_of(file_), outputs_, warnings_, true);
 }

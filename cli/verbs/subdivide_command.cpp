@@ -61,7 +61,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   std::vector<Output> outputs =
       checked_outputs(arguments.run, {Part::cage, Part::cutaway, Part::boundary, Part::region});
   apply_resources(arguments.run);
-  std::vector<std::string> warnings = unused_scene_options(verb, outputs);
+  std::vector<std::string> warnings = unused_output_options(verb, outputs);
   VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
   require_regions(outputs, regions_of(cage));
   const Marks read = marks_of(cage);

@@ -34,7 +34,8 @@ int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Out
   writing.options = options_of_result(verb);
   Json report{{"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
   report.update(details);
-  std::vector<std::string> warnings = run.warnings;
+  std::vector<std::string> warnings = unused_output_options(verb, outputs);
+  warnings.insert(warnings.end(), run.warnings.begin(), run.warnings.end());
   warn_of_names(marks_of(mesh), outputs, warnings);
   return write_checked(
       run.run, std::move(outputs), mesh, [&](const Output& output) { write_output(output, mesh, writing); }, warnings,

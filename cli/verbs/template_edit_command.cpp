@@ -39,6 +39,8 @@
 namespace subvol::cli {
 namespace {
 
+constexpr int kUsualParts = 2;  // of `split --into parts`
+
 /// Options of all edits; each verb offers those that it reads.
 struct EditArguments : TemplateRun {
   std::string mesh, other, inside;
@@ -46,7 +48,8 @@ struct EditArguments : TemplateRun {
   std::vector<int> counts;
   std::vector<Index> cells, vertices;
   double size = 0, margin = 5, share = 0.5, thickness = 0, growth = 1, tolerance = 1e-6;
-  int layers = 1, parts = 2;
+  int layers = 1;
+  std::optional<int> parts;  ///< none: kUsualParts
   bool invert = false, thin = false;
   Marks read;
   std::string what;
@@ -173,10 +176,13 @@ VolumeMesh make_split(EditArguments& arguments) {
   const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   if (arguments.what == "tets" && !arguments.vertices.empty())
     throw UsageError("template split: --into tets cuts all cells; leave --edge out");
+  if (arguments.what != "parts" && arguments.parts)
+    throw UsageError("template split: --parts goes with --into parts, not with --into " + arguments.what);
   if (arguments.what == "tets") return split_into_tets(mesh);
   if (arguments.vertices.empty()) throw UsageError("template split: --into " + arguments.what + " needs --edge A B");
   const Index a = arguments.vertices[0], b = arguments.vertices[1];
-  return arguments.what == "prisms" ? split_into_prisms(mesh, a, b) : split_sheet(mesh, a, b, arguments.parts);
+  return arguments.what == "prisms" ? split_into_prisms(mesh, a, b)
+                                    : split_sheet(mesh, a, b, arguments.parts.value_or(kUsualParts));
 }
 
 VolumeMesh make_pillowed(EditArguments& arguments) {
@@ -250,10 +256,14 @@ void add_grid(CLI::App& group, Action& action) {
 
 /// Adds --inside with --share, --box and --list.
 void add_choice(CLI::App& verb, EditArguments& arguments) {
-  verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
-      ->type_name("SURFACE");
+  CLI::Option* inside =
+      verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
+          ->type_name("SURFACE");
   verb.add_option("--share", arguments.share, "By at least this share of their volume")
-      ->check(number_in(1e-6, 1.0))->type_name("SHARE")->capture_default_str();
+      ->check(number_in(1e-6, 1.0))
+      ->type_name("SHARE")
+      ->capture_default_str()
+      ->needs(inside);
   add_box(verb, arguments, "Cells whose center lies in a box");
   add_cell_list(verb, arguments, "These cells, numbered from 0");
 }
@@ -343,7 +353,7 @@ void add_split(CLI::App& group, Action& action) {
   verb->add_option("--parts", a->parts, "Into how many layers")
       ->check(whole_number_in(2, 1000))
       ->type_name("N")
-      ->capture_default_str();
+      ->default_str(std::to_string(kUsualParts));
 }
 
 }  // namespace

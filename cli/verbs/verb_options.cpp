@@ -3,10 +3,12 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/scene_chord.h"
+#include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/target/surface_wrap.h"
 
 #include <algorithm>
 #include <charconv>
+#include <initializer_list>
 #include <sstream>
 #include <utility>
 
@@ -141,8 +143,15 @@ void require_fitting_options(const CLI::App& verb, bool points) {
   }
   if (!given("--crease-angle").empty())
     throw UsageError("--crease-angle: the target holds points, between which no edges can be seen");
+  if (!given("--keep-groups").empty()) throw UsageError("--keep-groups: the target holds points, which have no groups");
   if (const auto kind = given("--correspondence"); !kind.empty() && kind.back() == "voronoi")
     throw UsageError("--correspondence voronoi: the target holds points, which have no area to be cut into cells");
+}
+
+void warn_of_missing_groups(const CLI::App& verb, const TriangleMesh& target, std::vector<std::string>& warnings) {
+  const CLI::Option* option = verb.get_option_no_throw("--keep-groups");
+  if (option && option->count() > 0 && group_borders(target, target).empty())
+    warnings.emplace_back("--keep-groups has no effect: the target's faces have no borders between groups");
 }
 
 void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
@@ -207,16 +216,27 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->group(group);
 }
 
-std::vector<std::string> unused_scene_options(const CLI::App& verb, std::span<const Output> outputs) {
+std::vector<std::string> unused_output_options(const CLI::App& verb, std::span<const Output> outputs) {
   std::vector<std::string> warnings;
-  const auto warn = [&](const std::string& name, const char* missing) {
-    const CLI::Option* option = verb.get_option_no_throw(name);
-    if (option && option->count() > 0) warnings.push_back(name + " has no effect: no output is " + missing);
+  const auto warn_unless = [&](const auto& is_used_by, std::initializer_list<const char*> names, const char* missing) {
+    if (std::ranges::any_of(outputs, is_used_by)) return;
+    for (const std::string name : names)
+      if (const CLI::Option* option = verb.get_option_no_throw(name); option && option->count() > 0)
+        warnings.push_back(name + " has no effect: no output is " + missing);
   };
-  if (std::ranges::none_of(outputs, &Output::is_scene))
-    for (const char* name : {"--no-wireframe", "--quantize"}) warn(name, "a scene (.glb, .gltf)");
-  if (std::ranges::none_of(outputs, [](const Output& output) { return output.part == Part::cutaway; }))
-    warn("--cut", "a cutaway (cutaway:FILE)");
+  const auto has_unit = [](const Output& output) { return output.is_scene() || output.extension == ".usda"; };
+  const auto is_cutaway = [](const Output& output) { return output.part == Part::cutaway; };
+  const auto is_msh = [](const Output& output) { return output.extension == ".msh"; };
+  const auto is_vtu = [](const Output& output) { return output.extension == ".vtu"; };
+  const auto shows_limit = [](const Output& output) {
+    return output.part == Part::result && !output.is_volume() && output.extension != ".usda";
+  };
+  warn_unless(&Output::is_scene, {"--no-wireframe", "--quantize"}, "a scene (.glb, .gltf)");
+  warn_unless(has_unit, {"--unit", "--up"}, "a scene (.glb, .gltf) or .usda");
+  warn_unless(is_cutaway, {"--cut"}, "a cutaway (cutaway:FILE)");
+  warn_unless(is_msh, {"--msh-version"}, "a .msh");
+  warn_unless(is_vtu, {"--vtu-cells"}, "a .vtu");
+  warn_unless(shows_limit, {"--limit"}, "a surface or a scene");
   return warnings;
 }
 

@@ -7,6 +7,7 @@
 #include "cli/runs/writing.h"
 #include "subvol/base/types.h"
 #include "subvol/surface/region_surface.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <CLI/CLI.hpp>
 
@@ -40,8 +41,8 @@ void add_msh_version_option(CLI::App& verb, WritingOptions& options);
 /// --msh-version, --vtu-cells, --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
 
-/// Returns a warning for each option of scenes that was given although no output is one.
-std::vector<std::string> unused_scene_options(const CLI::App& verb, std::span<const Output> outputs);
+/// Returns a warning for each option that was given although no output has the format that it is for.
+std::vector<std::string> unused_output_options(const CLI::App& verb, std::span<const Output> outputs);
 
 /// --regions. Its value is empty unless it is given, so that it is not among the options that files record.
 void add_regions_option(CLI::App& verb, std::string& rule);
@@ -56,6 +57,8 @@ CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);
 
 /// UsageError: an option was given that has no meaning for the kind of target, points or a surface.
 void require_fitting_options(const CLI::App& verb, bool points);
+/// Adds a warning if --keep-groups was given, but the target has no borders between groups of faces.
+void warn_of_missing_groups(const CLI::App& verb, const TriangleMesh& target, std::vector<std::string>& warnings);
 /// Accepts numbers from low to high, and nothing else (CLI::Range accepts NaN).
 CLI::Validator number_in(double low, double high);
 /// Accepts whole numbers from low to high in decimal digits, and nothing else: no leading zeros, which CLI11 reads as

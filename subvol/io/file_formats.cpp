@@ -158,6 +158,23 @@ const FileFormat kFormats[] = {
     {.extension = ".usda", .name = "USD", .written = kText, .groups_written = kNames, .holds_features = true},
 };
 
+/// Files of a kind that is not read.
+struct ForeignFiles {
+  std::string_view extensions;  ///< in lower case, with blanks between them
+  std::string_view advice;      ///< what they are, and what to do with them
+};
+
+constexpr ForeignFiles kForeignFiles[] = {
+    {".step .stp .iges .igs .brep .brp .sat .sab .x_t .x_b .sldprt .sldasm .ipt .iam .catpart .catproduct .prt .3dm "
+     ".fcstd .f3d .dwg .dxf .jt .3dxml .scad",
+     "a CAD model: export an STL or OBJ file of it"},
+    {".blend .max .ma .mb .c4d .skp .lwo .3ds .x3d .wrl .xaml .usd .usdc .usdz .abc .ctm .amf",
+     "a model of another program: export an STL, OBJ or glTF file of it"},
+    {".zip .gz .bz2 .xz .zst .7z .rar .tar .tgz .zae", "an archive or compressed file: unpack it"},
+    {".med .su2 .vol .h5m .ugrid .node .ele .neu .unv .cas",
+     "a mesh of another program: convert it to .vtu or .msh, for instance with meshio or Gmsh"},
+};
+
 std::string_view said(Held held) {
   return held == Held::none ? "no" : held == Held::numbers ? "numbers" : "names";
 }
@@ -227,9 +244,19 @@ std::string readable_formats(bool of_cells) {
   std::string text;
   for (const FileFormat& format : kFormats) {
     if (format.holds_cells != of_cells || format.read.empty()) continue;
-    text += (text.empty() ? "" : ", ") + std::string(format.extension) + " (" + std::string(format.name);
-    text += format.read == "yes" ? ")" : " " + std::string(format.read) + ")";
+    text.append(text.empty() ? "" : " ").append(format.extension);
   }
+  return text;
+}
+
+std::string unknown_extension(const std::filesystem::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  const FileFormat* format = format_of_extension(extension);
+  if (format && format->read.empty()) return "files with the extension " + extension + " are written, not read";
+  std::string text = "unknown extension " + in_quotes(path.extension().string());
+  for (const ForeignFiles& files : kForeignFiles)
+    if ((" " + std::string(files.extensions) + " ").find(" " + extension + " ") != std::string::npos)
+      text.append(" (").append(files.advice).append(")");
   return text;
 }
 

@@ -45,7 +45,11 @@ const FileFormat* format_of_path(const std::filesystem::path& path);
 std::string cell_formats_table();
 std::string surface_formats_table();
 
-/// Returns a text such as ".mesh (Medit 1 to 4), .vtk (..)" of the formats that hold cells or surfaces and are read.
+/// Returns the extensions of the formats that hold cells or surfaces and are read, as text: ".mesh .vtk .vtu".
 std::string readable_formats(bool of_cells);
+
+/// Returns what is wrong with the extension of a file that is not read: that it is unknown, and if it belongs to a
+/// well-known kind of files, what to do with them.
+std::string unknown_extension(const std::filesystem::path& path);
 
 }  // namespace subvol

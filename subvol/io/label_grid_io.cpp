@@ -3,6 +3,7 @@
 
 #include "subvol/base/binary_value.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/length_range.h"
 #include "subvol/base/text_scanner.h"
 
@@ -63,8 +64,35 @@ std::string inflated(std::string_view data, std::size_t most, const FileText& fi
   return result;
 }
 
-/// Sets the labels of a grid, whose counts are set, from numbers in the order of voxels.
-void take_labels(LabelGrid& grid, std::string_view data, ValueType type, std::endian order, const FileText& file) {
+enum class VoxelOrder { first_axis_runs_fastest, last_axis_runs_fastest };
+
+/// Returns the name of a voxel, as (i, j, k), by its place in an order of voxels.
+std::string voxel_name(const LabelGrid& grid, std::size_t place, VoxelOrder order) {
+  std::array<std::size_t, 3> at{};
+  for (std::size_t n = 0; n < 3; ++n) {
+    const std::size_t axis = order == VoxelOrder::first_axis_runs_fastest ? n : 2 - n;
+    at[axis] = place % static_cast<std::size_t>(grid.counts[axis]);
+    place /= static_cast<std::size_t>(grid.counts[axis]);
+  }
+  return formatted("voxel (%zu, %zu, %zu)", at[0], at[1], at[2]);
+}
+
+/// Returns a number of a file as text, whole numbers with all digits.
+std::string value_text(const char* bytes, ValueType type, std::endian order) {
+  if (type.is_real()) return formatted("%.9g", decode(bytes, type, order));
+  const std::uint64_t bits = decode_bits(bytes, type, order);
+  return type.values == ValueType::Class::whole ? std::to_string(static_cast<std::int64_t>(bits))
+                                                : std::to_string(bits);
+}
+
+[[noreturn]] void refuse_type(const std::string& type, const FileText& file) {
+  file.fail("its numbers are of type " + type +
+            ", expected integers of 8 to 64 bits, or whole numbers as floats of 32 or 64 bits");
+}
+
+/// Sets the labels of a grid, whose counts are set, from numbers in an order of voxels, which they keep.
+void take_labels(LabelGrid& grid, std::string_view data, ValueType type, std::endian order, const FileText& file,
+                 VoxelOrder voxels = VoxelOrder::first_axis_runs_fastest) {
   std::size_t count = 1;
   for (const int n : grid.counts) count *= static_cast<std::size_t>(n);
   if (data.size() / type.size < count)
@@ -74,8 +102,8 @@ void take_labels(LabelGrid& grid, std::string_view data, ValueType type, std::en
   for (std::size_t i = 0; i < count; ++i) {
     const double value = decode(data.data() + i * type.size, type, order);
     if (!(value >= 0 && value <= std::numeric_limits<int>::max()) || value != std::floor(value))
-      file.fail("voxel " + std::to_string(i) + " has the value " + std::to_string(value) +
-                ", expected labels: whole numbers from 0 on");
+      file.fail(voxel_name(grid, i, voxels) + " has the value " + value_text(data.data() + i * type.size, type, order) +
+                ", expected labels: whole numbers from 0 to " + std::to_string(std::numeric_limits<int>::max()));
     grid.labels[i] = static_cast<int>(value);
   }
 }
@@ -137,7 +165,7 @@ ValueType numpy_type(const std::string& text, std::endian& order, const FileText
                                                        {"i4", kInt32},  {"u8", kUInt64}, {"i8", kInt64},
                                                        {"f4", kFloat32}, {"f8", kFloat64}};
   const auto at = word.size() == 3 ? kTypes.find(word.substr(1)) : kTypes.end();
-  if (at == kTypes.end()) file.fail("its numbers are of type " + in_quotes(word) + ", expected integers");
+  if (at == kTypes.end()) refuse_type(in_quotes(word), file);
   order = word[0] == '>' ? std::endian::big : std::endian::little;
   return at->second;
 }
@@ -153,11 +181,13 @@ LabelGrid read_numpy(const std::string& bytes, const FileText& file) {
   const std::string header = bytes.substr(begin, length);
   std::endian order = std::endian::little;
   const ValueType type = numpy_type(value_in_dict(header, "descr", file), order, file);
+  const bool is_fortran = value_in_dict(header, "fortran_order", file) == "True";
   LabelGrid grid;
   take_counts(grid, numbers_in(value_in_dict(header, "shape", file)), file);
-  take_labels(grid, std::string_view(bytes).substr(begin + length), type, order, file);
-  if (value_in_dict(header, "fortran_order", file) == "True") return grid;
-  std::vector<int> ordered(grid.labels.size());  // the last axis runs fastest
+  take_labels(grid, std::string_view(bytes).substr(begin + length), type, order, file,
+              is_fortran ? VoxelOrder::first_axis_runs_fastest : VoxelOrder::last_axis_runs_fastest);
+  if (is_fortran) return grid;
+  std::vector<int> ordered(grid.labels.size());
   std::size_t from = 0;
   for (int i = 0; i < grid.counts[0]; ++i)
     for (int j = 0; j < grid.counts[1]; ++j)
@@ -184,7 +214,7 @@ ValueType nrrd_type(const std::string& text, const FileText& file) {
       {"ulonglong", kUInt64},    {"unsigned long long", kUInt64}, {"uint64", kUInt64}, {"uint64_t", kUInt64},
       {"float", kFloat32},       {"double", kFloat64}};
   const auto at = kTypes.find(text);
-  if (at == kTypes.end()) file.fail("its numbers are of type " + in_quotes(text) + ", expected integers");
+  if (at == kTypes.end()) refuse_type(in_quotes(text), file);
   return at->second;
 }
 
@@ -261,6 +291,9 @@ LabelGrid read_nrrd(const std::string& bytes, const FileText& file) {
     std::string doubles;
     for (const double number : numbers_in(rest))
       doubles.append(reinterpret_cast<const char*>(&number), sizeof number);
+    if (doubles.size() / sizeof(double) * type.size < size)
+      file.fail("it holds " + std::to_string(doubles.size() / sizeof(double)) + " numbers, expected " +
+                std::to_string(size / type.size) + ", one for each voxel");
     take_labels(grid, doubles, kFloat64, std::endian::native, file);
   } else {
     file.fail("its encoding is " + in_quotes(encoding) + ", expected raw, gzip or ascii");
@@ -284,8 +317,9 @@ LabelGrid read_nifti(const std::string& bytes, const FileText& file) {
   static const std::map<int, ValueType> kTypes{{2, kUInt8},    {4, kInt16},    {8, kInt32},    {16, kFloat32},
                                                {64, kFloat64}, {256, kInt8},   {512, kUInt16}, {768, kUInt32},
                                                {1024, kInt64}, {1280, kUInt64}};
-  const auto type = kTypes.find(static_cast<int>(number(kType, kInt16)));
-  if (type == kTypes.end()) file.fail("its numbers are of a type that holds no labels");
+  const int code = static_cast<int>(number(kType, kInt16));
+  const auto type = kTypes.find(code);
+  if (type == kTypes.end()) refuse_type(std::to_string(code) + " of NIfTI", file);
   const double dimensions = number(kDim, kInt16);
   if (!(dimensions >= 1 && dimensions <= 7)) file.fail("its number of dimensions is out of range");
   std::vector<double> sizes;

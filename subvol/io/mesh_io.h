@@ -65,7 +65,7 @@ VolumeMesh read_volume_mesh(const std::filesystem::path& path, const ReadOptions
 /// IoError: the file cannot be written.
 void write_volume_mesh(const std::filesystem::path& path, const VolumeMesh& mesh);
 
-/// Returns the extensions that `read_volume_mesh` accepts, with their versions, as text for help and messages.
+/// Returns the extensions that `read_volume_mesh` accepts, as text for help and messages.
 std::string volume_mesh_formats();
 
 }  // namespace subvol

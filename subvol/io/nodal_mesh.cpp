@@ -139,8 +139,7 @@ bool is_nodal_extension(const fs::path& path) {
 NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, const std::string& references) {
   const NodalFormat* format = nodal_format(path);
   if (!format)
-    throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(path.extension().string()) +
-                     ", expected " + readable_formats(true));
+    throw InputError(path.string() + ": " + unknown_extension(path) + "; expected cells: " + readable_formats(true));
   const bool is_gmsh_mesh = format->parse == parse_mfem && is_gmsh(bytes);
   NodalMesh mesh = (is_gmsh_mesh ? parse_msh : format->parse)(path.string(), bytes, references);
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))

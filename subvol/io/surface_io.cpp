@@ -201,8 +201,7 @@ PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* wa
   const auto* parser = std::find_if(std::begin(kParsers), std::end(kParsers),
                                     [&](const Parser& p) { return extension == p.extension; });
   if (parser == std::end(kParsers))
-    throw InputError(path.string() + ": unknown surface extension " + in_quotes(extension) + ", expected " +
-                     surface_formats());
+    throw InputError(path.string() + ": " + unknown_extension(path) + "; expected a surface: " + surface_formats());
   Remarks remarks(path.string(), warnings);
   ParsedSurface parsed = parser->parse(path.string(), read_file(path));
   remarks.tell(parsed.warnings);
@@ -292,7 +291,7 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
                   "face is skipped: only the points are read");
     cloud.points = std::move(mesh.positions);
   } else {
-    remarks.fail("unknown extension " + in_quotes(extension) + " of points, expected " + point_cloud_formats());
+    remarks.fail(unknown_extension(path) + "; expected points: " + point_cloud_formats());
   }
   return sound_points(std::move(cloud.points), path.string(), warnings);
 }
@@ -322,6 +321,6 @@ bool is_surface_extension(const std::string& extension) {
 
 std::string surface_formats() { return readable_formats(false); }
 
-std::string point_cloud_formats() { return ".xyz (text), .ply (without faces)"; }
+std::string point_cloud_formats() { return ".xyz, or .ply without faces"; }
 
 }  // namespace subvol

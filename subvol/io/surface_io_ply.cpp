@@ -57,24 +57,34 @@ struct PlyElement {
   }
 };
 
+/// What a row of text holds: one element, as the format says, or as many values as fit.
+enum class PlyRows { elements, values };
+
 class PlyParser {
  public:
   /// attribute  vertex property whose values are kept, too; empty: none.
-  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "")
+  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "",
+            PlyRows rows = PlyRows::elements)
       : name_(name),
         size_(bytes.size()),
         scan_(name, bytes, TextScanner::Comments::none),
-        attribute_(std::move(attribute)) {}
+        attribute_(std::move(attribute)),
+        rows_(rows) {}
 
   ParsedSurface parse() {
     read_header();
     for (const PlyElement& element : elements_) read_element(element);
+    if (text_ && rows_ == PlyRows::values && scan_.peek()) fail("more values than the header says");
     for (const Index v : mesh_.face_vertices)
       if (static_cast<std::size_t>(v) >= mesh_.positions.size())
         throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
                          std::to_string(mesh_.positions.size()));
     add_groups();
     ParsedSurface parsed{std::move(mesh_), {}};
+    if (longer_rows_ > 0)
+      parsed.warnings.push_back(std::to_string(longer_rows_) + (longer_rows_ == 1 ? " row has" : " rows have") +
+                                " more values than the header says, the first in line " +
+                                std::to_string(first_longer_row_) + ": the rest of each row is passed over");
     left_out_.tell(parsed.warnings);
     return parsed;
   }
@@ -85,6 +95,9 @@ class PlyParser {
     return std::any_of(elements_.begin(), elements_.end(),
                        [](const PlyElement& element) { return element.holds_faces() && element.count > 0; });
   }
+
+  /// True if a row held more or fewer values than the header says.
+  bool has_other_rows() const { return has_shorter_row_ || longer_rows_ > 0; }
 
   /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
   std::vector<double> take_attribute() { return std::move(values_); }
@@ -254,7 +267,7 @@ class PlyParser {
            ", more than the rest of the file can hold");
     for (std::size_t i = 0; i < element.count; ++i) {
       if (vertices) mesh_.positions.emplace_back();
-      for (const Property& property : element.properties) read_property(property);
+      text_ ? read_row(element) : read_properties(element);
       if (!faces) continue;
       mesh_.face_offsets.push_back(mesh_.face_vertices.size());
       if (element.has(Property::Use::red)) {
@@ -262,6 +275,31 @@ class PlyParser {
         colors_->add_face(color_name(color_));
       }
     }
+  }
+
+  void read_properties(const PlyElement& element) {
+    for (const Property& property : element.properties) read_property(property);
+  }
+
+  /// Reads an element of text. Passes over what its row holds behind it. InputError: the row ends within it.
+  void read_row(const PlyElement& element) {
+    if (rows_ == PlyRows::values || !scan_.peek()) return read_properties(element);
+    const std::size_t row = scan_.word_line();
+    const auto require_same_row = [&] {
+      if (scan_.word_line() == row) return;
+      has_shorter_row_ = true;
+      scan_.fail("expected all values of an element " + in_quotes(element.name) + " in this line, found fewer", row);
+    };
+    try {
+      read_properties(element);
+    } catch (const InputError&) {
+      require_same_row();
+      throw;
+    }
+    require_same_row();
+    if (!scan_.peek() || scan_.word_line() != row) return;
+    scan_.line();
+    if (longer_rows_++ == 0) first_longer_row_ = row;
   }
 
   void read_property(const Property& property) {
@@ -354,17 +392,40 @@ class PlyParser {
   std::vector<std::int64_t> labels_;  // of the faces
   std::array<double, 3> color_{};     // of the present face
   std::optional<ColorGroups> colors_;
+  PlyRows rows_;
+  std::size_t longer_rows_ = 0, first_longer_row_ = 0;
+  bool has_shorter_row_ = false;
 };
+
+/// Returns the parser of a file that has been parsed, and the surface. If a file with more or fewer values in a row can
+/// only be read as values in rows of any length, it is.
+std::pair<PlyParser, ParsedSurface> parsed_ply(const std::string& name, std::string_view bytes,
+                                               const std::string& attribute = "") {
+  PlyParser parser(name, bytes, attribute);
+  try {
+    ParsedSurface surface = parser.parse();
+    return {std::move(parser), std::move(surface)};
+  } catch (const InputError&) {
+    if (!parser.has_other_rows()) throw;
+    try {
+      PlyParser again(name, bytes, attribute, PlyRows::values);
+      ParsedSurface surface = again.parse();
+      return {std::move(again), std::move(surface)};
+    } catch (const InputError&) {
+    }
+    throw;
+  }
+}
 
 }  // namespace
 
-ParsedSurface parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
+ParsedSurface parse_ply(const std::string& name, std::string_view bytes) { return parsed_ply(name, bytes).second; }
 
 bool ply_has_faces(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).has_faces(); }
 
 std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute) {
-  PlyParser parser(name, bytes, attribute);
-  const std::size_t num_vertices = parser.parse().mesh.positions.size();
+  auto [parser, surface] = parsed_ply(name, bytes, attribute);
+  const std::size_t num_vertices = surface.mesh.positions.size();
   std::vector<double> values = parser.take_attribute();
   if (values.size() != num_vertices) throw InputError(name + ": the vertices have no property " + in_quotes(attribute));
   return values;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // OFF, OBJ and XYZ.
+#include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/color_groups.h"
 #include "subvol/io/left_out.h"
@@ -27,8 +28,12 @@ OffCounts read_off_counts(TextScanner& scan) {
   const std::size_t vertices = scan.count("the number of vertices", 3);
   const std::size_t faces = scan.count("the number of faces", 2);
   const std::size_t line = scan.word_line();
-  const auto edges = scan.peek();
-  if (edges && scan.word_line() == line) scan.integer("the number of edges");
+  if (!scan.peek()) return {vertices, faces};
+  const std::size_t next_line = scan.word_line();
+  TextScanner ahead = scan;
+  ahead.next();
+  const bool is_alone = ahead.peek() && ahead.word_line() != next_line;  // as no vertex is
+  if (next_line == line || is_alone) scan.integer("the number of edges");
   return {vertices, faces};
 }
 
@@ -95,6 +100,10 @@ constexpr SkippedObj kSkippedObj[] = {{"vt", "texture coordinates"},
                                       {"lod"},
                                       {"shadow_obj"},
                                       {"trace_obj"}};
+
+/// Keywords of OBJ's free-form curves and surfaces.
+constexpr std::string_view kFreeFormObj[] = {"cstype", "deg",  "bmat", "step", "curv", "curv2", "surf",  "parm",
+                                             "trim",   "hole", "scrv", "sp",   "end",  "con",   "ctech", "stech"};
 
 /// The keywords of OBJ that name what the faces after them belong to, in order of preference.
 struct ObjNaming {
@@ -180,6 +189,8 @@ class ObjParser {
       if (*keyword == kObjNamings[i].keyword) return names_[i].begin(rest_of(words));
     const auto* skipped = std::find_if(std::begin(kSkippedObj), std::end(kSkippedObj),
                                        [&](const SkippedObj& s) { return s.keyword == *keyword; });
+    if (std::ranges::find(kFreeFormObj, *keyword) != std::end(kFreeFormObj))
+      scan_.fail("free-form curves and surfaces (" + in_quotes(*keyword) + ") are not read; export polygons", line_);
     if (skipped == std::end(kSkippedObj)) scan_.fail("unknown OBJ keyword " + in_quotes(*keyword), line_);
     if (skipped->missed) left_out_.add(skipped->missed);
   }
@@ -241,13 +252,19 @@ class ObjParser {
 
 }  // namespace
 
-ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
+namespace {
+
+/// has_long_rows  true: rows of vertices hold more than the keyword says, which is passed over.
+ParsedSurface parsed_off(const std::string& name, std::string_view bytes, bool has_long_rows) {
   TextScanner scan(name, bytes);
   const auto keyword = scan.next();
   if (!keyword) scan.fail("the file is empty, expected OFF");
   const bool plain = *keyword == kPlainOff;
-  if (!plain && std::find(std::begin(kOtherOff), std::end(kOtherOff), *keyword) == std::end(kOtherOff))
-    scan.fail("expected OFF (or COFF, NOFF, CNOFF, STOFF), found " + in_quotes(*keyword));
+  if (!plain && std::find(std::begin(kOtherOff), std::end(kOtherOff), *keyword) == std::end(kOtherOff)) {
+    if (keyword->ends_with("4OFF") || keyword->ends_with("nOFF"))
+      scan.fail("vertices of another dimension (" + in_quotes(*keyword) + "), expected OFF with three coordinates");
+    scan.fail("expected OFF (or COFF, NOFF, CNOFF, STOFF) as a word of its own, found " + in_quotes(*keyword));
+  }
   if (scan.peek() == std::optional<std::string_view>("BINARY")) scan.fail("binary OFF cannot be read; save it as text");
   const auto [num_vertices, num_faces] = read_off_counts(scan);
 
@@ -256,10 +273,11 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   ColorGroups colors;
   if (keyword->find('C') != std::string_view::npos) left_out.add("colors of vertices", num_vertices);
   if (keyword->find("ST") != std::string_view::npos) left_out.add("texture coordinates", num_vertices);
+  if (plain && has_long_rows) left_out.add("values behind the coordinates of vertices", num_vertices);
   mesh.positions.resize(num_vertices);
   for (Vec3& position : mesh.positions) {
     for (int i = 0; i < 3; ++i) position[i] = scan.number("a coordinate");
-    if (!plain) skip_rest_of_line(scan);  // normals, colors, texture coordinates
+    if (!plain || has_long_rows) skip_rest_of_line(scan);  // normals, colors, texture coordinates
   }
   for (std::size_t f = 0; f < num_faces; ++f) {
     const std::size_t corners = scan.count("the number of corners of a face", 1);
@@ -278,6 +296,20 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   ParsedSurface parsed{std::move(mesh), {}};
   left_out.tell(parsed.warnings);
   return parsed;
+}
+
+}  // namespace
+
+ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
+  try {
+    return parsed_off(name, bytes, false);
+  } catch (const InputError&) {
+    try {
+      return parsed_off(name, bytes, true);
+    } catch (const InputError&) {
+    }
+    throw;
+  }
 }
 
 ParsedSurface parse_obj(const std::string& name, std::string_view bytes) { return ObjParser(name, bytes).parse(); }

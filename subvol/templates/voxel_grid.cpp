@@ -2,6 +2,7 @@
 #include "subvol/templates/voxel_grid.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 
 #include <Eigen/Geometry>
 
@@ -22,11 +23,15 @@ void check_box(const Vec3& low, const Vec3& high) {
         "grid: the box and its sizes must be finite, and its high corner above its low one along every axis");
 }
 
+/// Returns true if the cells of a grid with so many lines can be numbered.
+bool can_be_numbered(const std::array<double, 3>& num_lines) {
+  // Lattice points are numbered with 32 bits, and a hex mesh has about three times as many faces.
+  return num_lines[0] * num_lines[1] * num_lines[2] <= std::numeric_limits<Index>::max() / 4.0;
+}
+
 /// Throws if a grid with so many lines has more cells than can be numbered.
 void check_lines(const std::array<double, 3>& num_lines) {
-  // Lattice points are numbered with 32 bits, and a hex mesh has about three times as many faces.
-  if (num_lines[0] * num_lines[1] * num_lines[2] > std::numeric_limits<Index>::max() / 4.0)
-    throw InputError("grid: more cells than can be numbered");
+  if (!can_be_numbered(num_lines)) throw InputError("grid: more cells than can be numbered");
 }
 
 }  // namespace
@@ -52,11 +57,10 @@ VoxelGrid box_grid(const Vec3& low, const Vec3& high, const std::array<int, 3>& 
 VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size) {
   check_box(low, high);
   if (!(size > 0) || !std::isfinite(size)) throw InputError("grid: the size of a cell must be finite and above 0");
-  std::array<int, 3> counts{};
-  for (int a = 0; a < 3; ++a)
-    counts[a] = static_cast<int>(
-        std::clamp(std::round((high[a] - low[a]) / size), 1.0, double(std::numeric_limits<int>::max() - 1)));
-  return box_grid(low, high, counts);
+  const Vec3 counts = ((high - low) / size).array().round().max(1);
+  if (!can_be_numbered({counts[0] + 1, counts[1] + 1, counts[2] + 1}))
+    throw InputError(internal::formatted("grid: with size %g, there are more cells than can be numbered", size));
+  return box_grid(low, high, {static_cast<int>(counts[0]), static_cast<int>(counts[1]), static_cast<int>(counts[2])});
 }
 
 VoxelGrid grid_through(const Mat3& frame, std::array<std::vector<double>, 3> lines) {

@@ -222,6 +222,7 @@ TEST_CASE("Points are fitted and checked one way, and what makes no sense with t
   refused("optimize template.mesh --target points.xyz -o no.mesh", 3, "points without faces");
   refused("optimize template.mesh --order 2 --target points.xyz -o no.vtu", 3, "points without faces");
   refused("template auto points.xyz -o no.mesh", 3, "points without faces");
+  refused("check points.xyz", 3, "only as the target of `fit --template` and `check --target`");
 }
 
 TEST_CASE("A template with a few inverted cells is untangled before a fit, a mirrored one is refused", "[cli][slow]") {
@@ -369,7 +370,7 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   refuses(kFit + "--order 3 --basis spline -o out.glb", 2, "basis");
   refuses(kFit + "--order 3 -o out.usda", 2, "out.usda");
   refuses(kFit + "--order 3 -o cage:out.mesh", 2, "cage");
-  refuses(kFit + "--order 10 -o out.msh", 3, "order");
+  refuses(kFit + "--order 10 -o out.msh", 2, "order");
   refuses(kFit + "-o cages:out.mesh", 2, "cages:");
   refuses(kFit + "-o out.mesh --report= target.off", 2, "--report: expected a value");
   refuses(kFit + "-o out.docx", 2, "out.docx");
@@ -472,6 +473,40 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(content_of(place / "e.mesh") == content_of(place / "c.mesh"));
   REQUIRE(place.run("subdivide template.mesh --config flat.toml --levels 1 -o d.mesh").status == 0);
   CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 10 * 8);
+}
+
+TEST_CASE("Options that have no effect beside others or on the target are told", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(kFit + "--levels 1 --max-iterations 1 --keep-groups --lambda-far 0.001 -o out.mesh");
+  CAPTURE(run.err);
+  CHECK(run.err.find("--keep-groups has no effect: the target's faces have no borders") != std::string::npos);
+  CHECK(run.err.find("--lambda-far 0.001 has no effect: it is below --lambda-close, 0.005") != std::string::npos);
+  std::string points;
+  for (int i = 0; i < 64; ++i)
+    points += std::to_string(i % 4) + " " + std::to_string(i / 4 % 4) + " " + std::to_string(i / 16) + "\n";
+  place.file("points.xyz", points);
+  CHECK(place.run("fit points.xyz --template template.mesh --keep-groups -o out.vtu").status == 2);
+}
+
+TEST_CASE("A key of a file of options that means nothing is refused with its line, whichever table it is in", "[cli]") {
+  const Workplace place(subvol::samples::bracket_sample());
+  const std::string grid = "template grid --box 0 0 0 1 1 1 --counts 1 1 1 -o grid.mesh --force --config a.toml";
+  const auto refuses = [&](const std::string& text, const std::string& message) {
+    place.file("a.toml", text);
+    const Run run = place.run(grid);
+    CAPTURE(text, run.err);
+    CHECK(run.status == 2);
+    CHECK(run.err.find(message) != std::string::npos);
+  };
+  refuses("quiet = true\n\nlevles = 2\n", "a.toml:3: template grid has no option 'levles'");
+  refuses("[fit]\ncells = 300\n# more\nlevles = 2\n", "a.toml:4: fit has no option 'levles'");
+  refuses("[template.grid]\ncounts = [1,\n1,\n1]\nlevels = 2\n", "a.toml:5: template grid has no option 'levels'");
+  refuses("[template]\nquiet = true\n", "a.toml:2: template has no option 'quiet': expected a table of a verb below");
+  refuses("[fti]\ncells = 300\n", "a.toml:2: there is no verb 'fti'");
+  refuses("[template.gird]\nquiet = true\n", "a.toml:2: there is no verb 'template gird'");
+  refuses("margin = 1\n[template.grid]\nmargin = 2\n", "a.toml:3: 'margin' stands there a second time");
+  place.file("a.toml", "[fit]\ncells = 300\n[template.auto]\ncells = 50\n[template.grid]\nquiet = true\n");
+  CHECK(place.run(grid).status == 0);
 }
 
 TEST_CASE("Every verb explains itself", "[cli][slow]") {

@@ -138,6 +138,27 @@ TEST_CASE("optimize: curved cells of other programs are untangled, and their bou
   CHECK(place.run("optimize tangled.msh -o x.usda").status == 2);
 }
 
+TEST_CASE("orders that a format does not hold are refused before the work, with one status, by every verb",
+          "[cli][slow]") {
+  const Workplace place;
+  const VolumeMesh prism{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+                         {CellKind::prism},
+                         {0, 6},
+                         {0, 1, 2, 3, 4, 5}};
+  write_volume(place / "curved.mfem", HighOrderMesh(ElementSpace(prism, Basis::legendre, 3), prism));
+  for (const std::string verb :
+       {"convert curved.mfem", "optimize curved.mfem", "optimize curved.mfem --target target.off",
+        "fit target.off --template template.mesh --order 10", "optimize template.mesh --target target.off --order 10",
+        "fit target.off --order 10", "shell target.off --thickness 1% --order 3"})
+    for (const char* name : {"x.msh", "x.inp", "x.xdmf", "x.usda"}) {
+      const Run run = place.run(verb + " --quiet -o " + name);
+      CAPTURE(verb, name, run.err);
+      CHECK(run.status == 2);
+      CHECK_THAT(run.err, Contains(std::string(name) + ": "));
+      CHECK_FALSE(place.has(name));
+    }
+}
+
 TEST_CASE("fit and optimize: curved cells of other programs are the start of a fit", "[cli][slow]") {
   const Workplace place;
   const std::string fit = "fit target.off --max-iterations 5 ";

@@ -78,14 +78,20 @@ TEST_CASE("Scenes are smaller without wireframe and in whole numbers", "[cli]") 
   check_with_validator({place / "small.glb"});
 }
 
-TEST_CASE("Options of scenes are warned of if no output is one", "[cli]") {
+TEST_CASE("Options of scenes and formats are warned of if no output is one", "[cli]") {
   const Workplace place;
-  const Run unused = place.run("convert template.mesh -o a.vtu --quantize --no-wireframe --cut x");
+  const Run unused = place.run(
+      "convert template.mesh -o a.mesh --quantize --no-wireframe --cut x --unit 0.001 --up z "
+      "--msh-version 2.2 --vtu-cells bezier --limit");
   CHECK(unused.status == 0);
-  for (const char* words : {"--quantize has no effect: no output is a scene", "--no-wireframe has no effect",
-                            "--cut has no effect: no output is a cutaway"})
+  for (const char* words :
+       {"--quantize has no effect: no output is a scene", "--no-wireframe has no effect",
+        "--cut has no effect: no output is a cutaway", "--unit has no effect", "--up has no effect",
+        "--msh-version has no effect: no output is a .msh", "--vtu-cells has no effect", "--limit has no effect"})
     CHECK(unused.err.find(words) != std::string::npos);
-  const Run used = place.run("convert template.mesh -o cutaway:b.glb --quantize --cut x");
+  const Run used = place.run(
+      "convert template.mesh -o cutaway:b.glb -o c.obj -o d.msh -o e.vtu --quantize --cut x "
+      "--unit 0.001 --up z --msh-version 2.2 --vtu-cells bezier --limit");
   CHECK(used.status == 0);
   CHECK(used.err.find("no effect") == std::string::npos);
 }

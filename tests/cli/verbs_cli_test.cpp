@@ -442,6 +442,9 @@ TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][
   CHECK(place.run("template collapse box.mesh --vertices 0 1 -o collapsed.mesh").status == 0);
   CHECK(subvol::read_volume_mesh(place / "collapsed.mesh").num_cells() == 4);
   CHECK(place.run("template split box.mesh --into tets -o tets.mesh").status == 0);
+  for (const char* unfitting : {"split box.mesh --into tets --parts 3", "carve box.mesh --list 0 --share 0.3",
+                                "split box.mesh --into prisms --edge 0 1 --parts 3"})
+    CHECK(place.run("template " + std::string(unfitting) + " -o unfitting.mesh").status == 2);
   CHECK(place.run("template refine box.mesh --box 0 0 0 1 1 1 -o refined.mesh").status == 0);
   CHECK(subvol::read_volume_mesh(place / "refined.mesh").num_cells() == 27 + 3 * 22 + 3 * 11 + 4);
   CHECK(place.run("template refine box.mesh -o x.mesh").status == 2);

@@ -8,6 +8,7 @@
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"
+#include "subvol/shell/extrude.h"
 #include "subvol/shell/ray_gap.h"
 #include "subvol/shell/thickness.h"
 #include "subvol/surface/boundary.h"
@@ -445,6 +446,22 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
     }
   for (Index i = 0; i < 9; ++i) add_face(folds, {0, 1 + i, 1 + (i + 1) % 9});
   CHECK_THROWS_WITH(make_shell(folds, {.thickness = 0.1}), Catch::Contains("vertex 0 at ("));
+}
+
+TEST_CASE("Layers that vanish beside the surface are refused with their thickness and the least one", "[shell]") {
+  const PolygonMesh surface = plane(Faces::triangles);
+  CHECK_THROWS_WITH(make_shell(surface, {.thickness = 1e-300}),
+                    Catch::Contains("thickness 1e-300 vanishes beside the surface; expected at least "));
+  CHECK_THROWS_WITH(make_shell(surface, {.thickness = 0.1, .layers = 20, .growth = 100}),
+                    Catch::Contains("growth 100 makes the thinnest of 20 layers"));
+  CHECK_THROWS_WITH(make_shell(surface, {.thickness = 0.1, .layers = 20, .growth = 0.01}),
+                    Catch::Contains("growth 0.01 makes the thinnest of 20 layers"));
+  std::vector<double> thickness(surface.positions.size(), 0.1);
+  thickness[3] = 1e-200;
+  CHECK_THROWS_WITH(make_shell(surface, {.vertex_thickness = thickness}),
+                    Catch::Contains("at vertex 3 at (") && Catch::Contains("thickness 1e-200 vanishes"));
+  CHECK_THROWS_WITH(extrude(surface, {.thickness = 1e-300}), Catch::Contains("extrude: thickness 1e-300 vanishes"));
+  CHECK(make_shell(surface, {.thickness = 1e-9}).failures.none());
 }
 
 TEST_CASE("Real surfaces get valid shells on every side", "[shell][data][slow]") {

@@ -48,6 +48,18 @@ TEST_CASE("file_formats: every format that is said to be read has a reader, and 
   CHECK(format_of_extension(".nothing") == nullptr);
 }
 
+TEST_CASE("file_formats: an extension that is not read is told with what to do", "[io]") {
+  CHECK(unknown_extension("a/b.what") == "unknown extension '.what'");
+  CHECK(unknown_extension("a/b") == "unknown extension ''");
+  CHECK_THAT(unknown_extension("a.b/c.USDA"), Contains("written, not read"));
+  CHECK_THAT(unknown_extension("a.STEP"), Contains("unknown extension '.STEP'") && Contains("export an STL"));
+  CHECK_THAT(unknown_extension("a.stl.gz"), Contains("unpack it"));
+  CHECK_THAT(unknown_extension("a.blend"), Contains("another program"));
+  CHECK_THAT(unknown_extension("a.med"), Contains("convert it"));
+  CHECK(readable_formats(true).starts_with(".mesh .vtk .vtu "));
+  CHECK(readable_formats(false).starts_with(".off .obj "));
+}
+
 TEST_CASE("file_formats: writers are those that the list names", "[io]") {
   const std::set<std::string_view> elsewhere{".mesh", ".vtk", ".vtu", ".msh", ".obj", ".glb", ".gltf", ".usda"};
   for (const FileFormat& format : file_formats()) {

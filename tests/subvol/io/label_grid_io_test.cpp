@@ -104,6 +104,31 @@ TEST_CASE("Segmentations are read from NRRD and NIfTI with the place of their vo
   }
 }
 
+TEST_CASE("Labels that are refused are named by their voxel, with all digits", "[io]") {
+  const test::TemporaryFolder files;
+  const auto refused = [&](const std::string& name, const std::string& bytes, const std::string& what) {
+    CHECK_THROWS_WITH(read_label_grid(files.file(name, bytes)), Catch::Contains(what));
+  };
+  std::string whole(24 * 8, '\0');
+  put<std::int64_t>(whole, 8 * 7, 2147483647);
+  CHECK(read_label_grid(files.file("fits.npy", npy("<i8", true, "2, 3, 4", whole))).labels[7] == 2147483647);
+  put<std::int64_t>(whole, 8 * 7, 720575940621039145);
+  refused("c.npy", npy("<i8", false, "2, 3, 4", whole),
+          "voxel (0, 1, 3) has the value 720575940621039145, expected labels: whole numbers from 0 to 2147483647");
+  refused("f.npy", npy("<u8", true, "2, 3, 4", whole), "voxel (1, 0, 1) has the value 720575940621039145,");
+  put<std::int64_t>(whole, 8 * 7, -3);
+  refused("n.npy", npy("<i8", true, "2, 3, 4", whole), "voxel (1, 0, 1) has the value -3,");
+  put<double>(whole, 8 * 7, 0.25);
+  refused("r.npy", npy("<f8", true, "2, 3, 4", whole), "voxel (1, 0, 1) has the value 0.25,");
+  refused("h.npy", npy("<f2", true, "2, 3, 4", whole), "of type '<f2', expected integers of 8 to 64 bits, or whole");
+  refused("b.nrrd", "NRRD0004\ntype: block\nsizes: 2 3 4\nencoding: raw\n\n", "of type 'block', expected integers");
+  refused("t.nrrd", "NRRD0004\ntype: uchar\nsizes: 2 3 4\nencoding: ascii\n\n1 2 3",
+          "it holds 3 numbers, expected 24, one for each voxel");
+  std::string colors = nifti();
+  put<std::int16_t>(colors, 70, 128);
+  refused("rgb.nii", colors, "of type 128 of NIfTI, expected integers");
+}
+
 TEST_CASE("Damaged segmentations are refused with the cause", "[io]") {
   const test::TemporaryFolder files;
   const auto refused = [&](const std::string& name, const std::string& bytes, const std::string& what) {

@@ -419,6 +419,57 @@ TEST_CASE("surfaces without extent, or whose areas leave the range of a double, 
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e39 0 0\n0 1e39 0\n3 0 1 2\n").triangles.size() == 1);
 }
 
+TEST_CASE("free-form surfaces of .obj are refused as what they are") {
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\ncstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 3\nend\n";
+  CHECK_THAT(surface_refusal("a.obj", text), Contains(":4: free-form curves and surfaces ('cstype') are not read"));
+}
+
+TEST_CASE("variants of .off are read, or refused as what they are") {
+  const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n", faces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+  for (const std::string header : {"OFF 4 4 6\n", "OFF\n4 4\n", "OFF\n4 4\n6\n", "OFF # all\n4 4 6 # of it\n",
+                                   "\xEF\xBB\xBFOFF\n4 4 6\n", "# first\n\nOFF\n4 4 6\n"}) {
+    CAPTURE(header);
+    check_tet(read_triangles("a.off", header + vertices + faces));
+  }
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  const auto colored =
+      folder.file("colored.off", "OFF\n4 4 6\n0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n0 0 1 255 0 0\n" + faces);
+  CHECK(read_polygon_mesh(colored, &warnings).positions[3] == Vec3(0, 0, 1));
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(warnings[0], Contains("4 values behind the coordinates of vertices"));
+  CHECK_THAT(surface_refusal("a.off", "4OFF\n4 4 6\n"), Contains("another dimension ('4OFF')"));
+  CHECK_THAT(surface_refusal("a.off", "nOFF\n3\n4 4 6\n"), Contains("another dimension ('nOFF')"));
+  CHECK_THAT(surface_refusal("a.off", "OFF BINARY\n"), Contains("binary OFF cannot be read"));
+  CHECK_THAT(surface_refusal("a.off", "OFF4 4 6\n" + vertices + faces), Contains("a word of its own, found 'OFF4'"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n4 5 6\n" + vertices + faces), Contains("the file ends"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n4 3 6\n" + vertices + faces), Contains("more than the counts say: '3'"));
+}
+
+TEST_CASE("rows of a text .ply that hold more values than the header says are read, with a warning") {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 4\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  const auto path =
+      folder.file("more.ply", header + vertices + "3 0 2 1 6 0.5 0.25\n3 0 1 3 6 1 1\n3 1 2 3\n3 2 0 3\n");
+  CHECK(read_polygon_mesh(path, &warnings).face_vertices == std::vector<Index>{0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3});
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(warnings[0], Contains("2 rows have more values than the header says, the first in line 14"));
+  // Several elements in a row are none too many.
+  warnings.clear();
+  const auto packed = folder.file("packed.ply", header + "0 0 0 1 0 0\n0 1 0 0 0 1\n3 0 2 1 3 0 1 3\n3 1 2 3 3 2 0 3");
+  CHECK(read_polygon_mesh(packed, &warnings).num_faces() == 4);
+  CHECK(warnings.empty());
+  CHECK_THAT(surface_refusal("a.ply", header + "0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"),
+             Contains(":10: expected all values of an element 'vertex' in this line, found fewer"));
+  CHECK_THAT(surface_refusal("a.ply", header + vertices + "3 0 2 1\n3 0 1\n3 1 2 3\n3 2 0 x\n"),
+             Contains(":15: expected all values of an element 'face'"));
+  CHECK_THAT(surface_refusal("a.ply", header + vertices + "3 0 2 1 6 0.5\n3 0 1 x\n"), Contains(":15:"));
+}
+
 TEST_CASE("an unknown surface extension is refused with the known ones") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_triangle_mesh(folder.file("a.xyz", "")),

@@ -53,6 +53,7 @@ TEST_CASE("A grid fills its box by counts and by size", "[templates]") {
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {1, 0, 1}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {100000, 100000, 100000}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 0.0), InputError);
+  CHECK_THROWS_WITH(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 1e-300), Catch::Contains("with size 1e-300"));
   CHECK_THROWS_AS(box_grid(Vec3::Constant(-1.5e308), Vec3::Constant(1.5e308), {1, 1, 1}), InputError);
 }
 
