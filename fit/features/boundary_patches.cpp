@@ -285,8 +285,8 @@ std::vector<EdgeAngle> smooth_edge_angles(const MeshTopology& topology, std::spa
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const auto &a = hits[2 * i], &b = hits[2 * i + 1];
     if (a.triangle == kNoIndex || b.triangle == kNoIndex) continue;
-    angles[i].angle =
-        angle_between_planes(unit_normal(target, a.triangle), unit_normal(target, b.triangle), b.point - a.point);
+    angles[i].angle = angle_between_planes(triangle_normal(target, a.triangle), triangle_normal(target, b.triangle),
+                                           b.point - a.point);
   }
   std::ranges::sort(angles, {}, &EdgeAngle::ends);
   return angles;

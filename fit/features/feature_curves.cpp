@@ -34,7 +34,7 @@ std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double a
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
         throw InputError("feature_curves: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
                          " of " + std::to_string(mesh.positions.size()));
-    normals.push_back(unit_normal(mesh, static_cast<Index>(t)));
+    normals.push_back(triangle_normal(mesh, static_cast<Index>(t)));
   }
   std::vector<std::array<Index, 2>> sharp;
   for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {

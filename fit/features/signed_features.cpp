@@ -37,7 +37,7 @@ std::span<const SurfaceHalfEdge> sides_at(std::span<const SurfaceHalfEdge> sides
 double interior_angle(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> pair) {
   const SurfaceHalfEdge &left = pair[0].forward ? pair[0] : pair[1], &right = pair[0].forward ? pair[1] : pair[0];
   const Vec3 along = mesh.positions[left.high] - mesh.positions[left.low];
-  const Vec3 n0 = unit_normal(mesh, left.triangle), n1 = unit_normal(mesh, right.triangle);
+  const Vec3 n0 = triangle_normal(mesh, left.triangle), n1 = triangle_normal(mesh, right.triangle);
   const Vec3 axis = n0.cross(n1);
   const double turn = std::atan2(axis.norm(), n0.dot(n1)) * 180 / std::numbers::pi;
   return axis.dot(along) >= 0 ? 180 - turn : 180 + turn;

@@ -53,7 +53,7 @@ int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::
   constexpr double kMost = 1000;
   if (at_edge.size() == 1 && !all_known) return 1;
   const auto corners = [&](const Keyed& side) { return mesh.triangles[order[side.edge.place]]; };
-  const auto normal = [&](const Keyed& side) { return unit_normal(mesh, order[side.edge.place]); };
+  const auto normal = [&](const Keyed& side) { return triangle_normal(mesh, order[side.edge.place]); };
   const auto is_forward = [&](const Keyed& side) {
     const int k = side.edge.corner;
     return corners(side)[k] < corners(side)[(k + 1) % 3];

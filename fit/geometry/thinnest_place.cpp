@@ -63,7 +63,7 @@ class Balls {
   /// Returns the place where the ball at a sample touches the surface again, if it is narrower than `most`; width 0:
   /// there is none that counts.
   ThinPlace place(const Sample& sample, double most) const {
-    const Vec3 front = unit_normal(mesh_, sample.triangle);
+    const Vec3 front = triangle_normal(mesh_, sample.triangle);
     if (!front.allFinite() || front.isZero()) return {};
     const Vec3 inward = side_ == ThinSide::wall ? Vec3(-front) : front;
     // The line across is within 30 degrees of the normal: the ball is no larger than the width over the root of 3.
@@ -94,7 +94,7 @@ class Balls {
     for (Index v : mesh_.triangles[place.triangles[0]])
       for (Index w : mesh_.triangles[place.triangles[1]])
         if (v == w) return false;
-    const double opposite = unit_normal(mesh_, place.triangles[0]).dot(unit_normal(mesh_, place.triangles[1]));
+    const double opposite = triangle_normal(mesh_, place.triangles[0]).dot(triangle_normal(mesh_, place.triangles[1]));
     return opposite <= kMostCosine && inward.dot(place.across - place.at) >= kLeastCosine * place.width;
   }
 

@@ -244,7 +244,7 @@ void Diagnostician::find_sharp_angles() {
   for (const auto& [i, j] : parts_.joined) {
     const SurfaceHalfEdge &a = parts_.sides[i], &b = parts_.sides[j];
     if (a.forward == b.forward || repeated_[a.triangle] || repeated_[b.triangle]) continue;
-    const double cosine = unit_normal(mesh_, a.triangle).dot(unit_normal(mesh_, b.triangle));
+    const double cosine = triangle_normal(mesh_, a.triangle).dot(triangle_normal(mesh_, b.triangle));
     if (!(cosine < least_cosine)) continue;
     places.push_back(edge_place(a, b.triangle));
     places.back().measure = 180 - std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;

@@ -139,7 +139,8 @@ void draw_to(const TriangleMesh& surface, const ClosestPoint& tree, double reach
   tree.closest(wrap.positions, hits);
   TriangleMesh moved = wrap;
   for (std::size_t v = 0; v < hits.size(); ++v)
-    if (hits[v].distance <= reach && normals[v].normalized().dot(unit_normal(surface, hits[v].triangle)) >= kSameWay)
+    if (hits[v].distance <= reach &&
+        normals[v].normalized().dot(triangle_normal(surface, hits[v].triangle)) >= kSameWay)
       moved.positions[v] = hits[v].point;
   for (bool is_done = false; !is_done;) {
     is_done = true;

@@ -43,7 +43,7 @@ inline double sixfold_volume(std::span<const Vec3> positions, const std::array<I
 }
 
 /// Returns the unit normal of a triangle, or the vector as it is if the triangle has no area.
-inline Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
+inline Vec3 triangle_normal(const TriangleMesh& mesh, Index triangle) {
   return doubled_area_vector(mesh, mesh.triangles[triangle]).normalized();
 }
 
