@@ -43,8 +43,10 @@ Content content_of(const std::filesystem::path& path, std::vector<std::string>& 
   require_known_file(path);
   if (is_surface_or_points(path)) {
     if (is_point_cloud_file(path))
-      throw InputError(path.string() +
-                       ": it holds points without faces, which only fit and check can use; expected a surface");
+      throw InputError(
+          path.string() +
+          ": it holds points without faces, which are only a target, of `fit --template` or of `check` with a mesh; "
+          "expected a surface");
     return read_polygon_mesh(path, &warnings);
   }
   if (holds_exact_map(path)) return ExactMap{};
