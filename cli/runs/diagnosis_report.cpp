@@ -231,8 +231,9 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis) {
 
 std::string to_text(const SurfaceDiagnosis& diagnosis) {
   std::ostringstream text;
-  text << formatted("%-20s", "surface") << diagnosis.num_triangles << " triangles, " << diagnosis.num_vertices
-       << " vertices, " << diagnosis.parts.size() << (diagnosis.parts.size() == 1 ? " part" : " parts")
+  text << formatted("%-20s", "surface") << diagnosis.num_triangles
+       << (diagnosis.num_triangles == 1 ? " triangle, " : " triangles, ") << diagnosis.num_vertices << " vertices, "
+       << diagnosis.parts.size() << (diagnosis.parts.size() == 1 ? " part" : " parts")
        << formatted(", diagonal %.6g, volume %.6g\n", diagnosis.diagonal, diagnosis.volume);
   std::string reasons;
   for (const SurfaceFinding& finding : diagnosis.findings) {

@@ -22,6 +22,8 @@ class ColorGroups {
   void add_face(const std::string& color);
   /// Returns the groups, or none. Colors that do not become groups count as left out.
   FaceGroups take(LeftOut& left_out, const char* what);
+  /// Returns the number of faces that have a color.
+  std::size_t num_colored() const { return num_colored_; }
 
  private:
   GroupList groups_;

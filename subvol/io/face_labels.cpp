@@ -24,9 +24,10 @@ void FaceLabels::add(const std::string& material, const std::string& object) {
   objects_.add(object);
 }
 
-FaceGroups FaceLabels::groups() const {
-  const bool by_material = materials_.tells_apart();
-  if (!by_material && !objects_.tells_apart()) return {};
+FaceGroups FaceLabels::groups(LeftOut& left_out) const {
+  const bool by_material = materials_.tells_apart(), by_object = objects_.tells_apart();
+  if (!by_material && !by_object) return {};
+  if (by_material && by_object) left_out.add("names of objects", objects_.names.size());
   const List& list = by_material ? materials_ : objects_;
   GroupList groups;
   FaceGroups result;

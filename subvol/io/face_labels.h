@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/io/left_out.h"
 #include "subvol/mesh/face_groups.h"
 
 #include <string>
@@ -13,8 +14,9 @@ class FaceLabels {
  public:
   /// Adds the labels of the next face; empty: none.
   void add(const std::string& material, const std::string& object);
-  /// Returns the groups: materials if they tell faces apart; else objects; none if these do not either.
-  FaceGroups groups() const;
+  /// Returns the groups: materials if they tell faces apart; else objects; none if these do not either. Objects that
+  /// tell faces apart and do not become groups count as left out.
+  FaceGroups groups(LeftOut& left_out) const;
 
  private:
   struct List {

@@ -9,6 +9,7 @@
 #include "subvol/io/sound_points.h"
 #include "subvol/io/surface_formats.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -57,11 +58,43 @@ class Remarks {
   std::vector<std::string>* warnings_;
 };
 
-/// Drops corners that repeat the one before, and then faces that are not polygons.
+/// Cuts a polygon that names vertices twice, as one does whose hole is joined to its outline by an edge there and back.
+/// Returns no triangles if the corners are no such polygon: they go along an edge twice the same way, or the triangles
+/// overlap.
+/// sorted  the corners in ascending order
+std::vector<std::array<Index, 3>> cut_at_holes(const std::vector<Vec3>& positions, const std::vector<Index>& corners,
+                                               std::vector<Index> sorted) {
+  constexpr double kOverlap = 1e-3;  // share of the area that a polygon may lose by not being flat
+  if (corners.size() < 5 || corners.size() > kMaxPolygonCorners) return {};
+  std::vector<std::pair<Index, Index>> edges;
+  for (std::size_t i = 0; i < corners.size(); ++i) edges.emplace_back(corners[i], corners[(i + 1) % corners.size()]);
+  std::sort(edges.begin(), edges.end());
+  if (std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return {};
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  PolygonMesh alone;
+  for (const Index v : sorted) alone.positions.push_back(positions[v]);
+  for (const Index v : corners)
+    alone.face_vertices.push_back(
+        static_cast<Index>(std::lower_bound(sorted.begin(), sorted.end(), v) - sorted.begin()));
+  alone.face_offsets.push_back(corners.size());
+  std::vector<std::array<Index, 3>> triangles;
+  Vec3 sum = Vec3::Zero();
+  double area = 0;
+  for (const auto& t : triangulate(alone).triangles) {
+    const auto& x = alone.positions;
+    const Vec3 of_one = internal::doubled_area_vector(x, t);
+    sum += of_one, area += of_one.norm();
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) triangles.push_back({sorted[t[0]], sorted[t[1]], sorted[t[2]]});
+  }
+  if (!(area > 0 && area <= sum.norm() * (1 + kOverlap))) return {};
+  return triangles;
+}
+
+/// Drops corners that repeat the one before, and then faces that are not polygons. Cuts polygons with holes.
 void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   PolygonMesh kept;
-  std::vector<Index>& of_face = mesh.face_groups.of_face;
-  std::size_t num_shortened = 0, num_dropped = 0;
+  const std::vector<Index>& of_face = mesh.face_groups.of_face;
+  std::size_t num_shortened = 0, num_dropped = 0, num_cut = 0;
   std::vector<Index> corners, sorted;
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
     const auto face = mesh.face(f);
@@ -70,26 +103,39 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
     while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
     sorted = corners;
     std::sort(sorted.begin(), sorted.end());
-    if (corners.size() < 3 || std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
-      ++num_dropped;
-      continue;
-    }
-    if (corners.size() > kMaxPolygonCorners)
+    const auto keep = [&](std::span<const Index> polygon) {
+      if (!of_face.empty()) kept.face_groups.of_face.push_back(of_face[f]);
+      kept.face_vertices.insert(kept.face_vertices.end(), polygon.begin(), polygon.end());
+      kept.face_offsets.push_back(kept.face_vertices.size());
+    };
+    const bool names_twice = std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end();
+    if (corners.size() > kMaxPolygonCorners && !names_twice)
       remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) +
                    " corners, expected at most " + std::to_string(kMaxPolygonCorners));
-    num_shortened += corners.size() < face.size();
-    if (!of_face.empty()) of_face[kept.num_faces()] = of_face[f];
-    kept.face_vertices.insert(kept.face_vertices.end(), corners.begin(), corners.end());
-    kept.face_offsets.push_back(kept.face_vertices.size());
+    std::vector<std::array<Index, 3>> pieces;
+    if (names_twice) pieces = cut_at_holes(mesh.positions, corners, sorted);
+    if (!pieces.empty()) {
+      ++num_cut;
+      for (const auto& piece : pieces) keep(piece);
+    } else if (corners.size() < 3 || names_twice) {
+      ++num_dropped;
+    } else {
+      num_shortened += corners.size() < face.size();
+      keep(corners);
+    }
   }
   mesh.face_vertices = std::move(kept.face_vertices);
   mesh.face_offsets = std::move(kept.face_offsets);
-  if (!of_face.empty()) of_face.resize(mesh.num_faces());
+  mesh.face_groups.of_face = std::move(kept.face_groups.of_face);
   remarks.count(num_shortened, "faces repeat a corner: the repetition is dropped",
                 "face repeats a corner: the repetition is dropped");
   remarks.count(num_dropped, "faces have fewer than three different corners or name one twice: dropped",
                 "face has fewer than three different corners or names one twice: dropped");
-  if (mesh.num_faces() == 0) remarks.fail(num_dropped ? "no usable faces" : "no faces");
+  remarks.count(num_cut, "polygons with holes are cut into triangles", "polygon with holes is cut into triangles");
+  if (mesh.num_faces() == 0)
+    remarks.fail(num_dropped == 0 ? "no faces"
+                                  : "no usable faces: all " + std::to_string(num_dropped) +
+                                        " have fewer than three different corners or name one twice");
 }
 
 /// Drops positions that `corners` does not name and renumbers `corners`. Returns the number of dropped positions.
@@ -194,6 +240,16 @@ std::size_t drop_repeated(std::vector<Vec3>& points) {
   return dropped;
 }
 
+/// Returns what a file holds instead of faces.
+std::string why_no_faces(const ParsedSurface& parsed) {
+  std::string text = "no faces";
+  if (!parsed.mesh.positions.empty())
+    text += ", only " + std::to_string(parsed.mesh.positions.size()) + " vertices (points are read from " +
+            point_cloud_formats() + ")";
+  for (const std::string& warning : parsed.warnings) text += "; " + warning;
+  return text;
+}
+
 }  // namespace
 
 PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* warnings) {
@@ -204,6 +260,7 @@ PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* wa
     throw InputError(path.string() + ": " + unknown_extension(path) + "; expected a surface: " + surface_formats());
   Remarks remarks(path.string(), warnings);
   ParsedSurface parsed = parser->parse(path.string(), read_file(path));
+  if (parsed.mesh.num_faces() == 0) remarks.fail(why_no_faces(parsed));
   remarks.tell(parsed.warnings);
   make_names_utf8(parsed.mesh.face_groups.groups);
   return sound_polygons(std::move(parsed.mesh), path.string(), warnings);

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <optional>
+#include <set>
 #include <type_traits>
 
 namespace subvol::internal {
@@ -26,10 +26,6 @@ class GltfParser {
   GltfParser(const std::string& name, std::string_view bytes) : name_(name) { load(bytes); }
 
   ParsedSurface parse() {
-    for (const std::string& extension : model_.extensionsRequired)
-      if (extension != "KHR_mesh_quantization" && !extension.starts_with("KHR_materials_") &&
-          extension != "KHR_texture_transform")
-        fail("requires the extension " + in_quotes(extension) + ", which is not read");
     if (model_.scenes.empty()) {
       for (std::size_t n = 0; n < model_.nodes.size(); ++n)
         if (!is_child(static_cast<int>(n))) add_node(static_cast<int>(n), Transform::Identity(), 0);
@@ -38,8 +34,10 @@ class GltfParser {
       for (const int node : at(model_.scenes, static_cast<int>(scene), "scene").nodes)
         add_node(node, Transform::Identity(), 0);
     }
+    if (welder_.is_empty()) left_out_.add("primitives of points or lines", num_lines_);
+    left_out_.add("meshes outside the scene", model_.meshes.size() - used_meshes_.size());
     ParsedSurface parsed{welder_.take(), {}};
-    parsed.mesh.face_groups = labels_.groups();
+    parsed.mesh.face_groups = labels_.groups(left_out_);
     left_out_.tell(parsed.warnings);
     return parsed;
   }
@@ -67,9 +65,26 @@ class GltfParser {
         is_binary ? reader.LoadBinaryFromMemory(&model_, &errors, &warnings,
                                                 reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
                   : reader.LoadASCIIFromString(&model_, &errors, &warnings, bytes.data(), size, folder);
+    constexpr std::string_view kBinaryOfVersion1("glTF\1\0\0\0", 8);
+    if (bytes.starts_with(kBinaryOfVersion1) || model_.asset.version.starts_with("1."))
+      fail("glTF 1.0 is not read; convert it to glTF 2.0");
+    require_known_extensions();
     if (read) return;
     std::replace(errors.begin(), errors.end(), '\n', ' ');
     fail("no glTF 2.0 file that can be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
+  }
+
+  /// Of the extensions without which a file must not be read, only those that do not concern the shape are ignored.
+  void require_known_extensions() const {
+    constexpr std::string_view kAppearance[] = {"_materials_", "_texture_", "_technique", "_lights_", "_xmp"};
+    for (const std::string& extension : model_.extensionsRequired) {
+      const bool is_appearance =
+          std::any_of(std::begin(kAppearance), std::end(kAppearance),
+                      [&](std::string_view part) { return extension.find(part) != std::string::npos; });
+      if (is_appearance || extension == "KHR_mesh_quantization") continue;
+      fail("requires the extension " + in_quotes(extension) + ", which is not read" +
+           (extension.ends_with("_compression") ? "; save the file without compression" : ""));
+    }
   }
 
   bool is_child(int node) const {
@@ -98,18 +113,33 @@ class GltfParser {
     if (depth > kMostDepth || ++num_nodes_ > model_.nodes.size()) fail("nodes are children of themselves");
     const Transform transform = above * transform_of(node);
     if (!transform.matrix().allFinite()) fail("node " + std::to_string(place) + ": a transform that is not finite");
-    if (node.mesh >= 0) add_mesh(at(model_.meshes, node.mesh, "mesh"), node, transform);
+    if (node.mesh >= 0) {
+      const tinygltf::Mesh& mesh = at(model_.meshes, node.mesh, "mesh");
+      used_meshes_.insert(node.mesh);
+      const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
+      left_out_.add("skins", node.skin >= 0);
+      left_out_.add("weights of morph targets",
+                    weights.size() - static_cast<std::size_t>(std::count(weights.begin(), weights.end(), 0.0)));
+      left_out_.add("lists of instances", node.extensions.contains("EXT_mesh_gpu_instancing"));
+      add_mesh(mesh, node, transform);
+    }
     for (const int child : node.children) add_node(child, transform, depth + 1);
   }
 
   void add_mesh(const tinygltf::Mesh& mesh, const tinygltf::Node& node, const Transform& transform) {
     for (const tinygltf::Primitive& primitive : mesh.primitives) {
       const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
-      if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP && mode != TINYGLTF_MODE_TRIANGLE_FAN)
-        continue;  // points and lines, such as wireframes
+      if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
+          mode != TINYGLTF_MODE_TRIANGLE_FAN) {  // points and lines, such as wireframes
+        ++num_lines_;
+        continue;
+      }
       const auto position = primitive.attributes.find("POSITION");
       if (position == primitive.attributes.end()) fail("a primitive without POSITION");
       const std::vector<double> x = numbers(position->second, 3, "POSITION");
+      for (const auto& [attribute, place] : primitive.attributes)
+        if (const char* missed = what_is_missed(attribute))
+          left_out_.add(missed, at(model_.accessors, place, "accessor").count);
       std::vector<std::size_t> corners;
       if (primitive.indices >= 0) {
         for (const double v : numbers(primitive.indices, 1, "indices")) {
@@ -125,6 +155,13 @@ class GltfParser {
     }
   }
 
+  /// Returns what an attribute of vertices is, for warnings; null for positions, normals and the parts of skins.
+  static const char* what_is_missed(const std::string& attribute) {
+    if (attribute.starts_with("TEXCOORD_")) return "texture coordinates";
+    if (attribute.starts_with("COLOR_")) return "colors of vertices";
+    return attribute.starts_with("_") ? "attributes of vertices" : nullptr;
+  }
+
   void add_triangles(const std::vector<double>& x, const std::vector<std::size_t>& corners, int mode,
                      const Transform& transform, const std::string& material, const std::string& object) {
     const bool mirrors = transform.linear().determinant() < 0;
@@ -138,7 +175,8 @@ class GltfParser {
       labels_.add(material, object);
     };
     if (mode == TINYGLTF_MODE_TRIANGLES) {
-      if (corners.size() % 3 != 0) fail("indices: expected three for each triangle");
+      if (corners.size() % 3 != 0)
+        fail("expected three vertices for each triangle, found " + std::to_string(corners.size()) + " in a primitive");
       for (std::size_t k = 0; k + 2 < corners.size(); k += 3) add(corners[k], corners[k + 1], corners[k + 2]);
       return;
     }
@@ -152,9 +190,39 @@ class GltfParser {
   /// The numbers of an accessor, `components` for each entry; normalized ones from -1 or 0 to 1.
   std::vector<double> numbers(int place, int components, const char* what) const {
     const tinygltf::Accessor& accessor = at(model_.accessors, place, "accessor");
-    if (accessor.sparse.isSparse) fail(std::string(what) + ": sparse accessors are not read");
     if (tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)) != components)
       fail(std::string(what) + ": expected " + std::to_string(components) + " numbers for each entry");
+    if (accessor.bufferView < 0) fail(std::string(what) + ": an accessor without data, which stands for zeros");
+    std::vector<double> values = numbers_of(accessor, components, what);
+    if (accessor.sparse.isSparse) replace_sparse(values, accessor, components, what);
+    return values;
+  }
+
+  /// Replaces the entries that the sparse part of an accessor names.
+  void replace_sparse(std::vector<double>& values, const tinygltf::Accessor& accessor, int components,
+                      const char* what) const {
+    tinygltf::Accessor places, entries = accessor;
+    places.bufferView = accessor.sparse.indices.bufferView;
+    places.byteOffset = static_cast<std::size_t>(accessor.sparse.indices.byteOffset);
+    places.componentType = accessor.sparse.indices.componentType;
+    places.type = TINYGLTF_TYPE_SCALAR;
+    entries.bufferView = accessor.sparse.values.bufferView;
+    entries.byteOffset = static_cast<std::size_t>(accessor.sparse.values.byteOffset);
+    if (accessor.sparse.count < 0) fail(std::string(what) + ": a sparse accessor of negative length");
+    places.count = entries.count = static_cast<std::size_t>(accessor.sparse.count);
+    const std::vector<double> at_places = numbers_of(places, 1, what),
+                              replacing = numbers_of(entries, components, what);
+    const auto step = static_cast<std::size_t>(components);
+    for (std::size_t i = 0; i < at_places.size(); ++i) {
+      if (!(at_places[i] >= 0 && at_places[i] < static_cast<double>(accessor.count)))
+        fail(std::string(what) + ": a sparse accessor replaces an entry that does not exist");
+      std::copy_n(replacing.begin() + static_cast<std::ptrdiff_t>(i * step), step,
+                  values.begin() + static_cast<std::ptrdiff_t>(at_places[i]) * components);
+    }
+  }
+
+  /// The numbers of the dense part of an accessor.
+  std::vector<double> numbers_of(const tinygltf::Accessor& accessor, int components, const char* what) const {
     const tinygltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, "buffer view");
     const std::vector<unsigned char>& bytes = at(model_.buffers, view.buffer, "buffer").data;
     const int size = tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
@@ -202,7 +270,8 @@ class GltfParser {
   TriangleWelder welder_;
   LeftOut left_out_;
   FaceLabels labels_;
-  std::size_t num_nodes_ = 0;
+  std::set<int> used_meshes_;
+  std::size_t num_nodes_ = 0, num_lines_ = 0;
 };
 
 }  // namespace

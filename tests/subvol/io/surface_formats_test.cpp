@@ -57,6 +57,52 @@ std::string format_refusal(const std::string& name, std::string_view bytes) {
   return "";
 }
 
+/// Reads a surface and returns its warnings, one line each.
+std::string warnings_of(const std::string& name, std::string_view bytes, PolygonMesh* mesh = nullptr) {
+  std::vector<std::string> warnings;
+  PolygonMesh found = read_polygon_mesh(format_folder().file(name, bytes), &warnings);
+  if (mesh) *mesh = std::move(found);
+  std::string text;
+  for (const std::string& warning : warnings) text += warning + "\n";
+  return text;
+}
+
+/// Volume that a closed surface encloses; negative if its normals point inward.
+double signed_volume(const PolygonMesh& mesh) {
+  const TriangleMesh triangles = triangulate(mesh);
+  double volume = 0;
+  for (const auto& t : triangles.triangles)
+    volume += triangles.positions[t[0]].dot(triangles.positions[t[1]].cross(triangles.positions[t[2]])) / 6;
+  return volume;
+}
+
+std::string with_part_replaced(std::string text, const std::string& from, const std::string& to) {
+  REQUIRE(text.find(from) != std::string::npos);
+  return text.replace(text.find(from), from.size(), to);
+}
+
+/// An archive of models by their paths.
+std::string models_archive(const std::map<std::string, std::string>& models) {
+  ZipWriter zip;
+  for (const auto& [path, model] : models) zip.add(path, model);
+  return zip.take();
+}
+
+/// A tetrahedron of volume 1/6 as an object of a .3mf.
+std::string tet_object(const std::string& id, const std::string& attributes = "", const std::string& of_first = "") {
+  return "<object id=\"" + id + "\" " + attributes +
+         "><mesh><vertices><vertex x=\"0\" y=\"0\" z=\"0\"/><vertex x=\"1\" y=\"0\" z=\"0\"/>"
+         "<vertex x=\"0\" y=\"1\" z=\"0\"/><vertex x=\"0\" y=\"0\" z=\"1\"/></vertices><triangles>"
+         "<triangle v1=\"0\" v2=\"2\" v3=\"1\" " +
+         of_first +
+         "/><triangle v1=\"0\" v2=\"1\" v3=\"3\"/>"
+         "<triangle v1=\"1\" v2=\"2\" v3=\"3\"/><triangle v1=\"2\" v2=\"0\" v3=\"3\"/></triangles></mesh></object>";
+}
+
+std::string model_of(const std::string& resources, const std::string& build, const std::string& attributes = "") {
+  return "<model " + attributes + "><resources>" + resources + "</resources><build>" + build + "</build></model>";
+}
+
 }  // namespace
 
 TEST_CASE("surface formats: surfaces that are written come back with their groups", "[io]") {
@@ -127,6 +173,65 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
       Contains("children of themselves"));
 }
 
+TEST_CASE("surface formats: glTF of a tetrahedron: mirrors, sparse accessors, and what is not read", "[io][quick]") {
+  std::string bytes;
+  const auto append = [&](auto... values) {
+    const auto one = [&](auto value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    (one(values), ...);
+  };
+  append(0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f);                              // byte 0: positions
+  for (const int v : {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3}) append(static_cast<std::uint16_t>(v));  // byte 48
+  append(std::uint16_t{3}, std::uint16_t{0}, 0.f, 0.f, 2.f);  // byte 72: vertex 3 moves to (0, 0, 2)
+  format_folder().file("tet.bin", bytes);
+  const std::string text = R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
+{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],
+"bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24},
+{"buffer":0,"byteOffset":72,"byteLength":4},{"buffer":0,"byteOffset":76,"byteLength":12}],
+"buffers":[{"uri":"tet.bin","byteLength":88}]})";
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    return with_part_replaced(text, from, to);
+  };
+  PolygonMesh found;
+  CHECK(warnings_of("t.gltf", text, &found).empty());
+  CHECK(signed_volume(found) == Approx(1.0 / 6));
+  warnings_of("t.gltf", changed(R"({"mesh":0})", R"({"mesh":0,"scale":[-2,1,1]})"), &found);
+  CHECK(signed_volume(found) == Approx(1.0 / 3));
+  const std::string
+      positions = R"("count":4,"type":"VEC3")",
+      sparse = positions +
+               R"(,"sparse":{"count":1,"indices":{"bufferView":2,"componentType":5123},"values":{"bufferView":3}})";
+  warnings_of("t.gltf", changed(positions, sparse), &found);
+  CHECK(signed_volume(found) == Approx(1.0 / 3));
+  const std::string of_no_vertex = R"("byteOffset":86,"byteLength":2)";  // vertex 16384
+  CHECK_THAT(format_refusal("t.gltf", with_part_replaced(changed(positions, sparse),
+                                                         R"("byteOffset":72,"byteLength":4)", of_no_vertex)),
+             Contains("replaces an entry that does not exist"));
+  CHECK_THAT(warnings_of("t.gltf", changed(R"("POSITION":0)", R"("POSITION":0,"TEXCOORD_0":0,"COLOR_0":0,"_HEAT":0)")),
+             Contains("4 colors of vertices, 4 texture coordinates, 4 attributes of vertices"));
+  CHECK_THAT(warnings_of("t.gltf", changed(R"("meshes":[{)", R"("meshes":[{"weights":[0,0.5],)")),
+             Contains("1 weights of morph targets"));
+  CHECK_THAT(warnings_of("t.gltf", changed(R"({"mesh":0})", R"({"mesh":0,"skin":0})")), Contains("1 skins"));
+  CHECK_THAT(warnings_of("t.gltf", changed(R"("primitives":[{"attributes")",
+                                           R"("primitives":[{"mode":1,"attributes":{"POSITION":0}}]},
+{"primitives":[{"attributes")")
+                                       .replace(text.find(R"({"mesh":0})"), 10, R"({"mesh":1})")),
+             Contains("1 meshes outside the scene"));
+  const std::string version1 = changed(R"("2.0")", R"("1.0")"), lines = changed(R"("indices":1)", R"("mode":1)");
+  CHECK_THAT(format_refusal("t.gltf", version1), Contains("glTF 1.0 is not read"));
+  CHECK_THAT(format_refusal("t.gltf", lines), Contains("no faces") && Contains("1 primitives of points or lines"));
+  const auto requiring = [&](const std::string& extension) {
+    return changed(R"("scenes")", "\"extensionsUsed\":[\"" + extension + "\"],\"extensionsRequired\":[\"" + extension +
+                                      "\"],\"scenes\"");
+  };
+  CHECK(warnings_of("t.gltf", requiring("KHR_techniques_webgl")).empty());
+  const std::string compressed =
+      with_part_replaced(requiring("KHR_draco_mesh_compression"), R"({"bufferView":1,)", "{");
+  CHECK_THAT(format_refusal("t.gltf", compressed),
+             Contains("KHR_draco_mesh_compression") && Contains("save the file without compression"));
+}
+
 /// Returns an archive of one file as ZIP64: all sizes and places stand in fields of 64 bits.
 std::string as_zip64(const std::string& archive) {
   const std::size_t directory = archive.find("PK\1\2"), end = archive.find("PK\5\6");
@@ -182,6 +287,33 @@ TEST_CASE("surface formats: COLLADA is read in place, with materials as groups",
   const std::map<std::string, double> found = areas(mesh);
   CHECK(found.at("floor") == Approx(4));
   CHECK(found.at("roof") == Approx(6));
+  CHECK(signed_volume(mesh) == Approx(2));
+  const std::string mirrored = with_part_replaced(text, "<translate>10 0 0</translate>", "<scale>-1 1 1</scale>");
+  CHECK(signed_volume(read_polygon_mesh(format_folder().file("mirror.dae", mirrored))) == Approx(2));
+  const std::string node = text.substr(text.find("<node"), text.find("</node>") + 7 - text.find("<node"));
+  const std::string second = with_part_replaced(with_part_replaced(node, "\"n\"", "\"twin\""), "10 0 0", "0 0 5");
+  PolygonMesh both;  // each node has both materials
+  CHECK_THAT(warnings_of("two.dae", with_part_replaced(text, node, node + second), &both),
+             Contains("2 names of objects"));
+  CHECK(signed_volume(both) == Approx(4));
+  CHECK(warnings_of("names.dae",
+                    with_part_replaced(with_part_replaced(with_part_replaced(text, node, node + second), "#m2", "#m1"),
+                                       "#m2", "#m1"),
+                    &both)
+            .empty());
+  CHECK(areas(both) == std::map<std::string, double>{{"n", 10}, {"twin", 10}});
+  CHECK_THAT(format_refusal("empty.dae", with_part_replaced(text, node, R"(<node id="n"><node id="m"/></node>)")),
+             Contains("no faces"));
+  const std::string colored =
+      with_part_replaced(text, "<lambert/>", "<lambert><diffuse><color>  1 0 0 1 </color></diffuse></lambert>");
+  CHECK(read_polygon_mesh(format_folder().file("color.dae", colored)).num_faces() == 6);
+  CHECK_THAT(format_refusal("word.dae", with_part_replaced(text, "<p>0 3 2 1", "<p>0 3 x2 1")),
+             Contains("expected whole numbers in <p>, found 'x2'"));
+  CHECK_THAT(format_refusal("word.dae", with_part_replaced(text, "<vcount>4 4<", "<vcount>4 .5<")),
+             Contains("expected whole numbers in <vcount>"));
+  std::string wide = "\xFF\xFE";
+  for (const char c : text) wide += {c, '\0'};
+  CHECK_THAT(format_refusal("wide.dae", wide), Contains("UTF-16"));
   CHECK_THROWS_WITH(read_polygon_mesh(format_folder().file("cut.dae", text.substr(0, 900))), Contains("cut.dae"));
   CHECK_THROWS_WITH(read_polygon_mesh(format_folder().file("no.fbx", "; FBX 7.4.0\n")), Contains("no.fbx"));
 }
@@ -218,6 +350,85 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
   std::string damaged = bytes;
   damaged[60] = static_cast<char>(damaged[60] ^ 4);
   CHECK_THAT(format_refusal("d.3mf", damaged), Contains("damaged"));
+}
+
+TEST_CASE("surface formats: objects of a .3mf may stand in other parts of the package", "[io][quick]") {
+  const std::string relations =
+      R"(<Relationships><Relationship Target="/3D/root.model" Type="http://x/3dmodel"/></Relationships>)";
+  const std::string root = model_of(
+      R"(<object id="1" name="pair"><components><component p:path="/3D/Objects/a.model" objectid="1"/>
+<component p:path="/3D/Objects/a.model" objectid="2" transform="-1 0 0 0 1 0 0 0 1 0 0 0"/></components></object>)",
+      R"(<item objectid="1"/><item p:path="/3D/Objects/b.model" objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/>)");
+  const std::map<std::string, std::string> models = {
+      {"_rels/.rels", relations},
+      {"3D/root.model", root},
+      {"3D/Objects/a.model", model_of(tet_object("1") + tet_object("2"), "")},
+      {"3D/Objects/b.model", model_of(tet_object("1", "name=\"b\""), "")}};
+  PolygonMesh found;
+  CHECK(warnings_of("parts.3mf", models_archive(models), &found).empty());
+  CHECK(found.num_faces() == 12);
+  CHECK(signed_volume(found) == Approx(0.5));  // the mirrored one is turned
+  CHECK(areas(found).size() == 2);
+  auto missing = models;
+  missing.erase("3D/Objects/b.model");
+  CHECK_THAT(format_refusal("p.3mf", models_archive(missing)), Contains("3D/Objects/b.model: is not in the archive"));
+  auto other = models;
+  other["3D/Objects/b.model"] = model_of(tet_object("7"), "");
+  CHECK_THAT(format_refusal("p.3mf", models_archive(other)), Contains("b.model: there is no object '1'"));
+  auto loop = models;
+  loop["3D/Objects/b.model"] = model_of(
+      R"(<object id="1"><components><component p:path="/3D/Objects/b.model" objectid="1"/></components></object>)", "");
+  CHECK_THAT(format_refusal("p.3mf", models_archive(loop)), Contains("include themselves"));
+}
+
+TEST_CASE("surface formats: colors of a .3mf are groups, and what is not read is told", "[io][quick]") {
+  const auto told = [](const std::string& model, PolygonMesh* mesh = nullptr) {
+    return warnings_of("t.3mf", models_archive({{"3D/a.model", model}}), mesh);
+  };
+  const std::string item = R"(<item objectid="1"/>)",
+                    colors =
+                        R"(<m:colorgroup id="5"><m:color color="#FF8000"/><m:color color="#0000FFC0"/></m:colorgroup>)";
+  CHECK(told(model_of(tet_object("1"), item, "unit=\"millimeter\"")).empty());
+  PolygonMesh found;
+  CHECK(told(model_of(colors + tet_object("1", "pid=\"5\" pindex=\"1\"", "p1=\"0\""), item), &found).empty());
+  CHECK(areas(found).at("#ff8000") == Approx(0.5));
+  CHECK(areas(found).size() == 2);
+  CHECK_THAT(told(model_of(colors + tet_object("1", "", "pid=\"5\" p1=\"0\" p2=\"1\" p3=\"0\""), item)),
+             Contains("1 faces with a color at each corner"));
+  CHECK_THAT(told(model_of(colors + R"(<basematerials id="6"><base name="steel"/></basematerials>)" +
+                               tet_object("1", "pid=\"5\" pindex=\"1\"", "pid=\"6\" p1=\"0\""),
+                           item)),
+             Contains("3 colors of faces"));
+  CHECK_THAT(told(model_of(R"(<m:texture2dgroup id="5"/>)" + tet_object("1", "pid=\"5\" pindex=\"0\""), item)),
+             Contains("4 faces with textures"));
+  CHECK_THAT(told(model_of(R"(<m:multiproperties id="5"/>)" + tet_object("1", "pid=\"5\" pindex=\"0\""), item)),
+             Contains("4 faces with several materials"));
+  CHECK_THAT(told(model_of(tet_object("1"), item, "unit=\"inch\"")), Contains("the unit of length is the inch"));
+  CHECK_THAT(told(model_of(tet_object("1", "s:slicestackid=\"4\""), item)), Contains("coarse stand-ins"));
+  CHECK_THAT(
+      told(model_of(tet_object("1") + tet_object("2", "type=\"solidsupport\""), item + R"(<item objectid="2"/>)")),
+      Contains("1 objects of type solidsupport"));
+  const std::string lattice =
+      with_part_replaced(tet_object("1"), "</mesh>",
+                         R"(<b:beamlattice><b:beams><b:beam v1="0" v2="1"/><b:beam v1="0" v2="2"/>
+</b:beams></b:beamlattice></mesh>)");
+  CHECK_THAT(told(model_of(lattice, item)), Contains("2 beams"));
+  const std::size_t begin = lattice.find("<triangles>"), end = lattice.find("</triangles>");
+  const auto refused = [](const std::string& model) {
+    return format_refusal("r.3mf", models_archive({{"3D/a.model", model}}));
+  };
+  CHECK_THAT(refused(model_of(lattice.substr(0, begin) + lattice.substr(end + 12), item)),
+             Contains("no faces, only 4 vertices") && Contains("2 beams"));
+  CHECK_THAT(refused(model_of(R"(<object id="1"><bo:booleanshape objectid="2"/></object>)", item)),
+             Contains("no faces") && Contains("1 objects of the kind 'booleanshape'"));
+  CHECK_THAT(refused(model_of(tet_object("1") + tet_object("1"), item)), Contains("two objects have the id '1'"));
+  CHECK_THAT(refused(model_of(tet_object("1"), item) + model_of("", "")), Contains("one root element"));
+  const std::string both = R"(<Relationships><Relationship Target="/3D/a.model" Type="http://x/3dmodel"/>
+<Relationship Target="/3D/b.model" Type="http://x/3dmodel"/></Relationships>)";
+  CHECK_THAT(warnings_of("two.3mf", models_archive({{"_rels/.rels", both},
+                                                    {"3D/a.model", model_of(tet_object("1"), item)},
+                                                    {"3D/b.model", model_of(tet_object("1"), item)}})),
+             Contains("2 models in the package, of which only 3D/a.model is read"));
 }
 
 TEST_CASE("surface formats: polygons and strips of a .vtp, and labels of its cells", "[io]") {

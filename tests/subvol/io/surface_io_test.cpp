@@ -263,6 +263,28 @@ TEST_CASE("what is dropped is said: unused vertices, repeated corners, faces wit
   CHECK(warnings.size() == 5);
 }
 
+TEST_CASE("a polygon whose hole is joined to its outline is cut into triangles") {
+  const std::string points = "OFF\n8 1 0\n0 0 0\n4 0 0\n4 4 0\n0 4 0\n1 1 0\n3 1 0\n3 3 0\n1 3 0\n";
+  std::vector<std::string> warnings;
+  const TriangleMesh mesh = read_triangles("a.off", points + "10 0 1 2 3 0 4 7 6 5 4\n", &warnings);
+  CHECK(mesh.triangles.size() == 8);
+  double area = 0;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 x = mesh.positions[t[0]];
+    area += (mesh.positions[t[1]] - x).cross(mesh.positions[t[2]] - x).z() / 2;
+  }
+  CHECK(area == Approx(12));
+  CHECK(warnings == std::vector<std::string>{warnings.at(0)});
+  CHECK_THAT(warnings.at(0), Contains("1 polygon with holes is cut into triangles"));
+  CHECK_THAT(surface_refusal("a.off", points + "8 0 1 2 3 0 1 2 3\n"),  // twice around
+             Contains("no usable faces: all 1 have fewer than three different corners or name one twice"));
+}
+
+TEST_CASE("a file without faces is refused with what it holds instead") {
+  CHECK_THAT(surface_refusal("a.obj", "v 0 0 0\nv 1 0 0\n"), Contains("no faces, only 2 vertices") && Contains(".xyz"));
+  CHECK_THAT(surface_refusal("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), Contains("1 lines"));
+}
+
 TEST_CASE("what a surface file holds beside its polygons is counted in one warning") {
   const auto told = [](const std::string& name, const std::string& text) {
     std::vector<std::string> warnings;
