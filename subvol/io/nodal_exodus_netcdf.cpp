@@ -169,12 +169,6 @@ class ExodusFile {
   std::size_t most_bytes_ = 0;
 };
 
-std::string upper_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  return text;
-}
-
 class ExodusParser {
  public:
   ExodusParser(const std::string& name, std::string_view bytes) : file_(name, bytes), cells_(mesh_) {}
@@ -212,7 +206,7 @@ class ExodusParser {
     const std::size_t n = count_of("num_nodes");
     if (!file_.dimension("num_nodes") || !file_.dimension("num_dim")) file_.fail("no Exodus file: expected num_nodes");
     if (count_of("num_dim") != 3)
-      file_.fail("expected three coordinates for each node, found " + std::to_string(count_of("num_dim")));
+      file_.fail("a mesh of " + std::to_string(count_of("num_dim")) + " dimensions: expected three, as of a solid");
     std::vector<double> x, y, z;
     if (file_.has("coord")) {
       const std::vector<double> all = file_.reals("coord", file_.size_of("coord", 3, n));

@@ -35,7 +35,8 @@ constexpr InpType kInpTypes[] = {
     {4, CellKind::tet, 1},  {5, CellKind::pyramid, 1}, {6, CellKind::prism, 1}, {8, CellKind::hex, 1},
     {10, CellKind::tet, 2}, {15, CellKind::prism, 2},  {20, CellKind::hex, 2},  {27, CellKind::hex, 2},
 };
-constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
+constexpr const char* kSolidFamilies[] = {"C3D", "DC3D",  "AC3D", "DCC3D", "F3D", "EC3D",
+                                          "Q3D", "EMC3D", "SC",   "CSS"};  // the last two: shells that are solids
 constexpr const char* kShellFamilies[] = {"STRI", "S", "M3D", "R3D", "SFM3D", "DS"};
 
 /// The number of a name such as REFERENCE_7, or REFERENCE_M7 for -7.
@@ -77,19 +78,19 @@ class InpParser {
     const InpType* type;
     std::size_t first_node, num_nodes;
     std::size_t set;  ///< of *ELEMENT, ELSET=; InpSets::kNone if it has none
-    InpPlace place;
+    FilePlace place;
   };
   struct Shell {
     std::size_t end;          ///< of its nodes
     std::size_t set;
-    InpPlace place;
+    FilePlace place;
   };
   struct Side {
     std::int64_t element;  ///< its number, if `set` is InpSets::kNone
     std::size_t set;
     int number;               ///< of the face
     Index surface;            ///< place in the list of groups
-    InpPlace place;
+    FilePlace place;
   };
   static constexpr std::size_t kNone = InpSets::kNone;
 
@@ -233,7 +234,9 @@ class InpParser {
   const InpInstance* instance_of_set() const {
     if (line_->instance || !line_->has("INSTANCE")) return line_->instance;
     const InpInstance* instance = lines_of_file_.instance(line_->parameter("INSTANCE"));
-    if (!instance) fail("there is no instance " + in_quotes(line_->parameter("INSTANCE")));
+    // A file without parts may name instances that it was made of.
+    if (!instance && lines_of_file_.has_parts())
+      fail("there is no instance " + in_quotes(line_->parameter("INSTANCE")));
     return instance;
   }
 
@@ -524,7 +527,7 @@ class InpParser {
 
   InpLines lines_of_file_;
   const InpLine* line_ = nullptr;
-  InpPlace place_;  ///< of what is read or built, for messages
+  FilePlace place_;  ///< of what is read or built, for messages
   std::unordered_map<std::int64_t, Index> nodes_, elements_by_label_;
   InpSets element_sets_, node_sets_;
   NodalMesh mesh_;
