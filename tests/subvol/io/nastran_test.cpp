@@ -31,8 +31,8 @@ std::string nastran_refusal(std::string_view bytes) {
   return "";
 }
 
-const std::string kPoints = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n";
-const std::string kTet = "CTETRA,1,1,1,2,3,4\n";
+const std::string kNastranPoints = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n";
+const std::string kNastranTet = "CTETRA,1,1,1,2,3,4\n";
 
 bool is_near(const Vec3& a, const Vec3& b) { return (a - b).norm() < 1e-12; }
 
@@ -44,13 +44,13 @@ TEST_CASE("Files that a Nastran file includes are read in its place", "[io][quic
   folder.file("parts/points.inc", "$ two\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\ninclude 'parts/more.inc'\n");
   folder.file("parts/more.inc", "GRID,3,,0.,1.,0.\nINCLUDE last.inc $ beside this file\n");
   folder.file("parts/last.inc", "GRID,4,,0.,0.,1.\n");
-  CHECK(read_nastran("SOL 101\nCEND\nBEGIN BULK\nINCLUDE 'parts/\n  points.inc'\n" + kTet + "ENDDATA\n").num_cells() ==
-        1);
-  CHECK(read_nastran("include \"parts\\points.inc\"\n" + kTet).num_cells() == 1);
-  folder.file("parts/end.inc", kPoints + kTet + "ENDDATA\n");
+  CHECK(read_nastran("SOL 101\nCEND\nBEGIN BULK\nINCLUDE 'parts/\n  points.inc'\n" + kNastranTet + "ENDDATA\n")
+            .num_cells() == 1);
+  CHECK(read_nastran("include \"parts\\points.inc\"\n" + kNastranTet).num_cells() == 1);
+  folder.file("parts/end.inc", kNastranPoints + kNastranTet + "ENDDATA\n");
   CHECK(read_nastran("INCLUDE 'parts/end.inc'\nnothing\nGRID,1,,x\n").num_cells() == 1);
 
-  CHECK_THAT(nastran_refusal(kPoints + "INCLUDE 'none.inc'\n" + kTet),
+  CHECK_THAT(nastran_refusal(kNastranPoints + "INCLUDE 'none.inc'\n" + kNastranTet),
              Contains("a.bdf:5: ") && Contains("none.inc: no such file"));
   CHECK_THAT(nastran_refusal("INCLUDE 'a.bdf'\n"), Contains("8 files in one another"));
   CHECK_THAT(nastran_refusal("INCLUDE 'a.bdf\n"), Contains("a.bdf:1: ") && Contains("quote"));
@@ -69,7 +69,7 @@ TEST_CASE("Points of Nastran in other coordinate systems are taken into the basi
       "CORD1R,8,1,4,2,7,10,11,12\n"
       "GRID,10,,1.,1.,1.\nGRID,11,,1.,1.,5.\nGRID,12,6,1.,90.,0.\n";
   const auto point = [&](const std::string& grid) {
-    return read_nastran(kPoints + systems + grid + kTet).positions.back();
+    return read_nastran(kNastranPoints + systems + grid + kNastranTet).positions.back();
   };
   CHECK(is_near(point("GRID,9,5,2.,90.,4.\n"), {5, 2, 5}));   // y of system 5 is z
   CHECK(is_near(point("GRID,9,6,2.,0.,30.\n"), {4, 2, 3}));   // towards its z
@@ -81,12 +81,12 @@ TEST_CASE("Points of Nastran in other coordinate systems are taken into the basi
   const NodalMesh by_default = read_nastran("GRDSET,,5\n" + systems +
                                             "GRID,1,0,0.,0.,0.\nGRID,2,0,1.,0.,0.\n"
                                             "GRID,3,0,0.,1.,0.\nGRID,4,,1.,0.,0.\n" +
-                                            kTet);
+                                            kNastranTet);
   CHECK(is_near(by_default.positions.back(), {1, 3, 3}));
 
-  CHECK_THAT(nastran_refusal(kPoints + "GRID,9,3,0.,0.,0.\n"),
+  CHECK_THAT(nastran_refusal(kNastranPoints + "GRID,9,3,0.,0.,0.\n"),
              Contains("a.bdf:5: ") && Contains("coordinate system 3, which the file does not have"));
-  const std::string user = "GRID,9,3,0.,0.,0.\n" + kPoints;
+  const std::string user = "GRID,9,3,0.,0.,0.\n" + kNastranPoints;
   CHECK_THAT(nastran_refusal(user + "CORD2R,3,,0.,0.,0.,1.,0.,0.\n,2.,0.,0.\n"),
              Contains("a.bdf:6: ") && Contains("on a line"));
   CHECK_THAT(
@@ -116,18 +116,18 @@ TEST_CASE("Cards of Nastran that repeat the one before them are read", "[io][qui
   CHECK(mesh.positions[15] == Vec3(0, 1, 2));
   CHECK(mesh.references == std::vector<int>{7, 7, 8, 9});
   CHECK(mesh.cell(3)[2] == 15);
-  CHECK_THAT(nastran_refusal(kPoints + "=,*1,=,=,=,*1.\n=(999999999),\n"),
+  CHECK_THAT(nastran_refusal(kNastranPoints + "=,*1,=,=,=,*1.\n=(999999999),\n"),
              Contains("a.bdf:6: ") && Contains("repeated"));
-  CHECK_THAT(nastran_refusal(kPoints + "=,*1,=,=,=,*1.\n=(x)\n"), Contains("a.bdf:6: ") && Contains("COUNT"));
+  CHECK_THAT(nastran_refusal(kNastranPoints + "=,*1,=,=,=,*1.\n=(x)\n"), Contains("a.bdf:6: ") && Contains("COUNT"));
   CHECK_THAT(nastran_refusal("=,*1,==\n"), Contains("none before it"));
 }
 
 TEST_CASE("Cells of Nastran may be numbered either way", "[io][quick]") {
-  const std::string points = kPoints +
+  const std::string points = kNastranPoints +
                              "GRID,5,,1.,1.,1.\nGRID,6,,9.,0.,0.\nGRID,7,,8.,0.,0.\nGRID,8,,8.,1.,0.\n"
                              "GRID,9,,8.,0.,1.\n";
   const std::string lone = "CTETRA,3,1,7,8,6,9\n";  // left-handed, without neighbors
-  const auto path = nastran_folder().file("b.bdf", points + kTet + "CTETRA,2,1,2,4,3,5\n" + lone);
+  const auto path = nastran_folder().file("b.bdf", points + kNastranTet + "CTETRA,2,1,2,4,3,5\n" + lone);
   std::vector<std::string> warnings;
   const VolumeMesh mesh = read_volume_mesh(path, {.check = false, .warnings = &warnings});
   REQUIRE(mesh.num_cells() == 3);
@@ -145,7 +145,7 @@ TEST_CASE("Cells of Nastran may be numbered either way", "[io][quick]") {
   const NodalMesh inverted = read_nastran(
       "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
       "GRID,5,,.2,.2,.1\n" +
-      kTet + "CTETRA,2,1,1,3,2,5\n");
+      kNastranTet + "CTETRA,2,1,1,3,2,5\n");
   CHECK(inverted.warnings.empty());
   CHECK(inverted.cell(1)[1] == 2);
 }
@@ -153,29 +153,31 @@ TEST_CASE("Cells of Nastran may be numbered either way", "[io][quick]") {
 TEST_CASE("Sections of Nastran's files are told apart", "[io][quick]") {
   const std::string control = "SOL 101\nCEND\nCMETHOD = 5\nCSCALE = 2\nSET 1 = 1,2\nBEGIN BULK\n";
   const std::string others = "CONV,1,2\nCAERO1,1\nCSET,1\nCBAR,7,1,1,2\nCBAR,8,1,1,2\nRBE2,9,1,123\n";
-  const NodalMesh mesh = read_nastran(control + kPoints + kTet + others);
+  const NodalMesh mesh = read_nastran(control + kNastranPoints + kNastranTet + others);
   REQUIRE(mesh.warnings.size() == 1);
   CHECK_THAT(mesh.warnings[0], Contains("2 elements of type CBAR, 1 elements of type RBE2") && !Contains("C M"));
-  const std::string further = control + kPoints + kTet + "BEGIN SUPER=1\n";
+  const std::string further = control + kNastranPoints + kNastranTet + "BEGIN SUPER=1\n";
   CHECK(read_nastran(further + "MAT1,1\n").num_cells() == 1);
-  CHECK_THAT(nastran_refusal(further + kPoints), Contains("a.bdf:13: ") && Contains("begins in line 12"));
-  CHECK_THAT(nastran_refusal(control + kPoints + "CBAR,7,1,1,2\n"),
+  CHECK_THAT(nastran_refusal(further + kNastranPoints), Contains("a.bdf:13: ") && Contains("begins in line 12"));
+  CHECK_THAT(nastran_refusal(control + kNastranPoints + "CBAR,7,1,1,2\n"),
              Contains("pyramids in the file; not carried over: 1 elements of type CBAR"));
 }
 
 TEST_CASE("Cards of Nastran that are incomplete, doubled or curved pyramids are not read as others", "[io][quick]") {
   const std::string first = "CTETRA         1       1       1       2       3       4                +A\n";
-  CHECK(read_nastran(kPoints + first + "+A\n").num_cells() == 1);
-  CHECK_THAT(nastran_refusal(kPoints + first + "+B             5\n"),
+  CHECK(read_nastran(kNastranPoints + first + "+A\n").num_cells() == 1);
+  CHECK_THAT(nastran_refusal(kNastranPoints + first + "+B             5\n"),
              Contains("a.bdf:5: ") && Contains("continuation 'B'"));
-  CHECK(read_nastran(kPoints + kPoints + kTet).positions.size() == 4);
-  CHECK_THAT(nastran_refusal(kPoints + "GRID,2,,1.,0.,.5\n"), Contains("a.bdf:5: ") && Contains("second GRID 2"));
-  CHECK_THAT(nastran_refusal(kPoints + "CPYRAM,1,1,1,2,3,4,5,6\n"),
+  CHECK(read_nastran(kNastranPoints + kNastranPoints + kNastranTet).positions.size() == 4);
+  CHECK_THAT(nastran_refusal(kNastranPoints + "GRID,2,,1.,0.,.5\n"),
+             Contains("a.bdf:5: ") && Contains("second GRID 2"));
+  CHECK_THAT(nastran_refusal(kNastranPoints + "CPYRAM,1,1,1,2,3,4,5,6\n"),
              Contains("a.bdf:5: ") && Contains("curved pyramid"));
 }
 
 TEST_CASE("Shells of Nastran without cells are a surface", "[io][quick]") {
-  const auto path = nastran_folder().file("s.bdf", kPoints + "CTRIA3,1,5,1,2,3\nCQUAD4,2,6,1,2,3,4\nCBAR,3,1,1,2\n");
+  const auto path =
+      nastran_folder().file("s.bdf", kNastranPoints + "CTRIA3,1,5,1,2,3\nCQUAD4,2,6,1,2,3,4\nCBAR,3,1,1,2\n");
   std::vector<std::string> warnings;
   const FileCells cells = read_cells(path, {.warnings = &warnings});
   const auto* surface = std::get_if<PolygonMesh>(&cells);
