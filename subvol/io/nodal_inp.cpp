@@ -402,28 +402,15 @@ class InpParser {
     for (std::size_t s = 0; s < node_sets_.size(); ++s)
       if (node_sets_.is_defined(s) && !has_group(node_sets_.name(s))) wanted.push_back(s);
     if (wanted.empty()) return;
-    const std::vector<std::array<Index, 4>> boundary = boundary_faces();
-    std::vector<std::vector<Index>> faces_at(mesh_.positions.size());
-    for (std::size_t f = 0; f < boundary.size(); ++f) faces_at[boundary[f][0]].push_back(static_cast<Index>(f));
-    std::vector<std::size_t> in_set(mesh_.positions.size(), kNone);
-    std::vector<Index> faces;
+    BoundaryOfNodes boundary(mesh_);
     for (const std::size_t s : wanted) {
-      const std::vector<Index>& members = node_sets_.members(s);
-      for (const Index v : members) in_set[v] = s;
-      faces.clear();
-      for (const Index v : members)
-        for (const Index f : faces_at[v])
-          if (std::ranges::all_of(boundary[f], [&](Index w) { return w == kNoIndex || in_set[w] == s; }))
-            faces.push_back(f);
-      if (faces.empty() || faces.size() == boundary.size()) {
+      const auto faces = boundary.faces_of(node_sets_.members(s));
+      if (faces.empty()) {
         left_out_.add("node sets of no faces, or of all");
         continue;
       }
       const Index group = faces_.by_name(node_sets_.name(s));
-      for (const Index f : faces) {
-        const std::size_t size = boundary[f][3] == kNoIndex ? 3 : 4;
-        add_face(mesh_, std::span(boundary[f]).first(size), group);
-      }
+      for (const std::span<const Index> face : faces) add_face(mesh_, face, group);
     }
   }
 
@@ -435,26 +422,6 @@ class InpParser {
                                         (group.name.empty() && is_name("GROUP_" + std::to_string(group.number)));
                                }) ||
            std::ranges::any_of(plain_names_, [&](const auto& plain) { return is_name(plain.second); });
-  }
-
-  /// The faces of one cell, by their corners; the fourth of a triangle is kNoIndex.
-  std::vector<std::array<Index, 4>> boundary_faces() const {
-    const auto tables = faces_by_kind(inp_faces);
-    std::vector<std::pair<FaceKey, std::array<Index, 4>>> faces;
-    for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
-      for (const std::vector<int>& local : tables[static_cast<std::size_t>(mesh_.kinds[c])]) {
-        std::array<Index, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
-        for (std::size_t i = 0; i < local.size(); ++i) corners[i] = mesh_.cell(c)[static_cast<std::size_t>(local[i])];
-        faces.emplace_back(face_key(std::span(corners).first(local.size())), corners);
-      }
-    std::sort(faces.begin(), faces.end());
-    std::vector<std::array<Index, 4>> boundary;
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      const bool is_twin = (i > 0 && faces[i - 1].first == faces[i].first) ||
-                           (i + 1 < faces.size() && faces[i + 1].first == faces[i].first);
-      if (!is_twin) boundary.push_back(faces[i].second);
-    }
-    return boundary;
   }
 
   void add_side(const Side& side, std::size_t element) {
