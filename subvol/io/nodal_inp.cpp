@@ -206,7 +206,7 @@ class InpParser {
 
   void read_element(const std::vector<std::string>& fields) {
     if (!type_) {
-      ++num_skipped_[skipped_type_];
+      ++(shell_corners_ > 0 ? num_shells_ : num_skipped_)[skipped_type_];
       if (shell_corners_ > 0) read_shell(fields);
       return;
     }
@@ -328,8 +328,26 @@ class InpParser {
       mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
   }
 
+  void count_sets_of_shells() {
+    std::set<std::size_t> used;
+    for (const Shell& shell : shells_) used.insert(shell.set);
+    for (std::size_t s = 0; s < node_sets_.size(); ++s) left_out_.add("node sets", node_sets_.is_defined(s));
+    for (std::size_t s = 0; s < element_sets_.size(); ++s)
+      left_out_.add("element sets", element_sets_.is_defined(s) && !used.contains(s));
+  }
+
+  void tell_left_out() {
+    for (const auto& [type, n] : num_skipped_) left_out_.add("elements of type " + type, n);
+    left_out_.tell(mesh_.warnings);
+  }
+
   void build() {
-    if (elements_.empty() && !shells_.empty()) return build_shells();
+    if (elements_.empty() && !shells_.empty()) {
+      build_shells();
+      count_sets_of_shells();
+      tell_left_out();
+      return;
+    }
     std::vector<Index> nodes;
     for (std::size_t e = 0; e < elements_.size(); ++e) {
       const Element& element = elements_[e];
@@ -343,8 +361,8 @@ class InpParser {
     add_node_sets();
     mesh_.face_groups.groups = group_names();
     choose_references();
-    for (const auto& [type, n] : num_skipped_) left_out_.add("elements of type " + type, n);
-    left_out_.tell(mesh_.warnings);
+    for (const auto& [type, n] : num_shells_) num_skipped_[type] += n;
+    tell_left_out();
   }
 
   Index node(const Element& element, std::size_t i, std::size_t e) {
@@ -505,7 +523,8 @@ class InpParser {
   std::vector<Shell> shells_;
   std::vector<std::int64_t> shell_nodes_;            ///< corners
   std::size_t shell_corners_ = 0;                    ///< of the elements being read; 0: no shells
-  std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types
+  std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types, but for
+  std::map<std::string, std::size_t> num_shells_;    ///< those of shells
   std::vector<std::size_t> sections_;                ///< their sets of elements
   GroupList faces_;
   std::map<Index, std::string> plain_names_;  ///< of surfaces of instances, without the instance
