@@ -6,6 +6,7 @@
 #include "subvol/export/lagrange_cells.h"
 #include "subvol/export/lagrange_mesh.h"
 #include "subvol/export/text_format.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>
@@ -72,6 +73,12 @@ HighOrderFile curved_mesh(const std::string& name, NodalMesh mesh, std::vector<s
   require_sound(name, corners);
   std::vector<int> references = std::move(mesh.references);
   VolumeFaceGroups face_groups = renumbered(mesh.face_groups, number);
+  if (const std::size_t given = mesh.face_groups.faces.size(); given > 0) {
+    face_groups = groups_of_faces(face_groups, MeshTopology(corners));
+    if (const std::size_t lone = given - face_groups.faces.size(); lone > 0 && warnings)
+      warnings->push_back(name + ": " + std::to_string(lone) + " faces with a group are faces of no cell: dropped");
+    if (face_groups.faces.empty()) face_groups = {};
+  }
   std::vector<Group> regions = std::move(mesh.regions);
   try {
     const NodalMesh cells = with_one_order(std::move(mesh), order);

@@ -77,12 +77,14 @@ std::vector<std::string> polynomial_cells_warnings(const PolynomialCells& cells)
                                                                "inside faces"
                                                              : "the basis legendre needs no such approximation up to "
                                                                "the largest order of the format"));
-  if (!cells.check.valid())
-    warnings.push_back(cells.file + ": its polynomial cells, which other programs compute with, are not valid" +
-                       (cells.check.quality ? formatted(": %zu of %zu are not certified",
-                                                        cells.check.quality->certificate.not_certified.size(),
-                                                        cells.check.quality->num_cells)
-                                            : std::string()));
+  if (!cells.check.valid()) {
+    std::string why;
+    if (const auto& quality = cells.check.quality; quality && !quality->certificate.not_certified.empty())
+      why = formatted(": %zu of %zu are not certified", quality->certificate.not_certified.size(), quality->num_cells);
+    else if (!cells.check.intersecting_faces.empty())
+      why = formatted(": %zu pairs of faces of their boundary meet", cells.check.intersecting_faces.size());
+    warnings.push_back(cells.file + ": its polynomial cells, which other programs compute with, are not valid" + why);
+  }
   return warnings;
 }
 

@@ -64,6 +64,9 @@ std::string read_file(const std::filesystem::path& path) {
   while (file.read(buffer, sizeof buffer) || file.gcount() > 0)
     bytes.append(buffer, static_cast<std::size_t>(file.gcount()));
   if (!file.eof()) throw InputError(path.string() + ": cannot be read: " + std::strerror(errno));
+  if (bytes.starts_with("version https://git-lfs.github.com/spec/"))
+    throw InputError(path.string() +
+                     ": only a pointer of Git LFS to the file: get the file itself with `git lfs pull`");
   return bytes;
 }
 
@@ -207,6 +210,13 @@ std::string lower_case(std::string_view text) {
   for (char& c : lower)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return lower;
+}
+
+std::string upper_case(std::string_view text) {
+  std::string upper(text);
+  for (char& c : upper)
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  return upper;
 }
 
 void append_number(std::string& text, double value) {

@@ -12,7 +12,7 @@
 namespace subvol::internal {
 
 /// Returns the whole content of a file. InputError: the file does not exist, is not a regular file (but a folder,
-/// device or pipe), or cannot be read.
+/// device or pipe), cannot be read, or is a pointer of Git LFS.
 std::string read_file(const std::filesystem::path& path);
 
 /// Returns a text without the blanks, tabs and carriage returns at its ends.
@@ -85,8 +85,9 @@ std::optional<std::int64_t> parse_integer(std::string_view word);
 /// Returns a word from a file for a message: in quotes, at most 40 characters, '?' for all but printable ASCII.
 std::string in_quotes(std::string_view word);
 
-/// Returns the text with its ASCII letters in lower case.
+/// Return the text with its ASCII letters in lower case, or in upper case.
 std::string lower_case(std::string_view text);
+std::string upper_case(std::string_view text);
 
 /// Appends the shortest text that reads back as the same double.
 void append_number(std::string& text, double value);

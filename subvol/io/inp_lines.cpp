@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <filesystem>
 #include <numbers>
 #include <utility>
 
@@ -31,23 +30,12 @@ std::vector<std::string> fields_of(std::string_view line) {
 
 }  // namespace
 
-void fail_at(const InpPlace& place, const std::string& what) {
-  throw InputError(*place.file + ":" + std::to_string(place.line) + ": " + what);
-}
-
-std::string upper_case(std::string_view text) {
-  std::string upper(text);
-  for (char& c : upper)
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  return upper;
-}
-
 std::string InpLine::parameter(const char* name) const {
   const auto found = parameters.find(name);
   return found == parameters.end() ? "" : found->second;
 }
 
-InpLines::InpLines(const std::string& name, std::string_view bytes) : name_(name), bytes_(bytes) {}
+InpLines::InpLines(const std::string& name, std::string_view bytes) : name_(name), bytes_(bytes), included_(name) {}
 
 void InpLines::visit(const std::function<void(const InpLine&)>& visit) {
   visit_ = visit;
@@ -205,16 +193,11 @@ void InpLines::replay_parts_in_place() {
 }
 
 void InpLines::include(int depth) {
-  constexpr int kMostDepth = 8, kMostFiles = 64;  // far beyond any model; a file may include itself
   const std::string input = line_.parameter("INPUT");
   if (input.empty()) fail_at(line_.place, "*INCLUDE: expected INPUT=FILE");
-  if (depth + 1 > kMostDepth || ++num_included_ > kMostFiles)
-    fail_at(line_.place, "*INCLUDE: more than " + std::to_string(kMostDepth) + " files in one another, or more than " +
-                             std::to_string(kMostFiles) + " in all");
-  const std::filesystem::path path = std::filesystem::path(*line_.place.file).parent_path() / input;
-  const std::string bytes = read_file(path);
+  const IncludedFiles::File file = included_.read(line_.place, input, depth + 1);
   line_.keyword.clear();
-  read_file_of(path.string(), bytes, depth + 1);
+  read_file_of(file.name, file.bytes, depth + 1);
 }
 
 }  // namespace subvol::internal

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/io/file_place.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -14,13 +15,6 @@
 
 namespace subvol::internal {
 
-/// A place in a file, for messages.
-struct InpPlace {
-  const std::string* file = nullptr;
-  std::size_t line = 0;
-};
-[[noreturn]] void fail_at(const InpPlace& place, const std::string& what);
-
 /// A part in its place in the assembly: x -> rotation x + shift. Numbers of nodes and elements are its own.
 struct InpInstance {
   std::string name;        ///< empty: the only one
@@ -32,15 +26,12 @@ struct InpInstance {
 /// Numbers of nodes and elements are below it; `InpInstance::first` is a multiple of it.
 inline constexpr std::int64_t kInpNumbers = std::int64_t{1} << 40;
 
-/// Text in upper case: keywords, parameters and names of sets are the same whatever their case is.
-std::string upper_case(std::string_view text);
-
 /// One line of an Abaqus or CalculiX file.
 struct InpLine {
   std::string keyword;                            ///< in upper case; for data that of the last keyword
   std::map<std::string, std::string> parameters;  ///< of the keyword, by name in upper case
   std::vector<std::string> fields;                ///< of data, between commas; empty for a keyword
-  InpPlace place;
+  FilePlace place;
   const InpInstance* instance = nullptr;  ///< null: none; what stands in the assembly or outside parts
   bool is_data() const { return !fields.empty(); }
   bool has(const char* name) const { return parameters.contains(name); }
@@ -62,14 +53,16 @@ class InpLines {
   /// Returns the instance of this name, or null. Valid after the lines before its use were visited.
   const InpInstance* instance(const std::string& name) const;
   std::size_t num_instances() const { return instances_.size(); }
+  /// Returns true if a part or an instance has begun.
+  bool has_parts() const { return !parts_.empty(); }
   std::size_t unused_parts() const { return unused_parts_; }
   /// The last line of the file, for messages at its end.
-  const InpPlace& place() const { return line_.place; }
+  const FilePlace& place() const { return line_.place; }
 
  private:
   struct RawLine {
     std::string text;
-    InpPlace place;
+    FilePlace place;
   };
   struct Part {
     std::string name;
@@ -91,6 +84,7 @@ class InpLines {
   std::string name_;
   std::string_view bytes_;
   std::function<void(const InpLine&)> visit_;
+  IncludedFiles included_;
   std::deque<std::string> files_;  ///< names, for the places of lines
   std::deque<Part> parts_;
   std::deque<InpInstance> instances_;
@@ -99,7 +93,6 @@ class InpLines {
   Part* recorded_ = nullptr;             ///< the part whose lines are being read
   Part* pending_ = nullptr;              ///< the part of the instance whose transformation is being read
   std::size_t num_transformations_ = 0;  ///< lines of that instance
-  int num_included_ = 0;
   std::size_t unused_parts_ = 0, num_replayed_ = 0;
   bool is_replaying_ = false;
 };

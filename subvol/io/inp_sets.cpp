@@ -35,15 +35,15 @@ std::size_t InpSets::find(const std::string& name) const {
 }
 
 void InpSets::add_range(std::size_t set, std::int64_t first, std::int64_t last, std::int64_t step,
-                        const InpPlace& place) {
+                        const FilePlace& place) {
   sets_[set].items.push_back({first, last, step, kNone, place});
 }
 
-void InpSets::add_set(std::size_t set, std::size_t other, const InpPlace& place) {
+void InpSets::add_set(std::size_t set, std::size_t other, const FilePlace& place) {
   sets_[set].items.push_back({0, 0, 1, other, place});
 }
 
-void InpSets::close(const InpPlace& place) {
+void InpSets::close(const FilePlace& place) {
   std::map<std::string, std::vector<std::size_t>> by_plain_key;
   for (std::size_t s = 0; s < sets_.size(); ++s)
     if (sets_[s].is_defined) by_plain_key[sets_[s].plain_key].push_back(s);

@@ -34,12 +34,12 @@ class InpSets {
   std::size_t find(const std::string& name) const;
 
   /// Add every step-th number of a range, or the members of another set.
-  void add_range(std::size_t set, std::int64_t first, std::int64_t last, std::int64_t step, const InpPlace& place);
-  void add_set(std::size_t set, std::size_t other, const InpPlace& place);
+  void add_range(std::size_t set, std::int64_t first, std::int64_t last, std::int64_t step, const FilePlace& place);
+  void add_set(std::size_t set, std::size_t other, const FilePlace& place);
 
   /// To be called when all lines are read. A name of the assembly that is not defined there, but in one instance,
   /// stands for the set of this instance. place: the end of the file, for messages.
-  void close(const InpPlace& place);
+  void close(const FilePlace& place);
   bool is_defined(std::size_t set) const { return sets_[set].is_defined; }
   /// The name for people: without the instance if no other set has it.
   const std::string& name(std::size_t set) const { return sets_[set].name; }
@@ -54,7 +54,7 @@ class InpSets {
   struct Item {
     std::int64_t first, last, step;
     std::size_t other;
-    InpPlace place;
+    FilePlace place;
   };
   struct Set {
     std::string name, key;  ///< as first written; in the assembly, in upper case

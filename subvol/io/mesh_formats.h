@@ -28,6 +28,9 @@ ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const st
 std::string format_medit(const VolumeMesh& mesh);
 std::string format_legacy_vtk(const VolumeMesh& mesh);
 
+/// Throws InputError: a file has no cells. warnings: those of reading it, which tell what it has instead.
+[[noreturn]] void fail_without_cells(const std::string& name, const std::vector<std::string>& warnings);
+
 /// Reason for messages why curved pyramids cannot be read.
 inline constexpr const char* kNoCurvedPyramids =
     "pyramids are read with straight edges only, because their functions of higher order are no polynomials";

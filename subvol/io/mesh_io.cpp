@@ -178,7 +178,7 @@ FileCells read_cells(const fs::path& path, const ReadOptions& options) {
     parsed.warnings = std::move(mesh.warnings);
     if (mesh.num_cells() > 0) parsed.mesh = linear_mesh(name, std::move(mesh));
   }
-  if (parsed.mesh.num_cells() == 0) throw InputError(name + ": no hexes, prisms, tets or pyramids in the file");
+  if (parsed.mesh.num_cells() == 0) fail_without_cells(name, parsed.warnings);
   require_extent(name, parsed.mesh);
   turn_over_mirrored(parsed, options.check);
   if (options.check) check_mesh(name, parsed);

@@ -169,12 +169,6 @@ class ExodusFile {
   std::size_t most_bytes_ = 0;
 };
 
-std::string upper_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  return text;
-}
-
 class ExodusParser {
  public:
   ExodusParser(const std::string& name, std::string_view bytes) : file_(name, bytes), cells_(mesh_) {}
@@ -184,7 +178,7 @@ class ExodusParser {
     read_blocks();
     name_references();
     read_side_sets();
-    warn_of_node_sets();
+    read_node_sets();
     left_out_.tell(mesh_.warnings);
     return std::move(mesh_);
   }
@@ -212,7 +206,7 @@ class ExodusParser {
     const std::size_t n = count_of("num_nodes");
     if (!file_.dimension("num_nodes") || !file_.dimension("num_dim")) file_.fail("no Exodus file: expected num_nodes");
     if (count_of("num_dim") != 3)
-      file_.fail("expected three coordinates for each node, found " + std::to_string(count_of("num_dim")));
+      file_.fail("a mesh of " + std::to_string(count_of("num_dim")) + " dimensions: expected three, as of a solid");
     std::vector<double> x, y, z;
     if (file_.has("coord")) {
       const std::vector<double> all = file_.reals("coord", file_.size_of("coord", 3, n));
@@ -380,17 +374,48 @@ class ExodusParser {
     file_.fail(where + ": there is no element " + std::to_string(element));
   }
 
-  /// Sets of the nodes of side sets say nothing new: those of the same name, and those without one whose corners are
-  /// the ones of the side set of their number.
-  void warn_of_node_sets() {
+  /// Node sets that hold all corners of some faces of the boundary become groups of these faces. Sets of the nodes of
+  /// side sets say nothing new: those of the same name, and those without one whose corners are the ones of the side
+  /// set of their number.
+  void read_node_sets() {
     const std::size_t n = count_of("num_node_sets");
     const std::vector<std::string> names = file_.names("ns_names", n);
     const std::vector<long long> numbers = ids("ns_prop1", file_.size_of("ns_prop1", n, 1));
+    std::optional<BoundaryOfNodes> boundary;
     for (std::size_t s = 0; s < n; ++s) {
       const bool is_known = names[s].empty() ? holds_corners_of_group(s, numbers[s])
                                              : std::ranges::find(side_names_, names[s]) != side_names_.end();
-      if (!is_known) left_out_.add("node sets");
+      if (is_known) continue;
+      if (!boundary) boundary.emplace(mesh_);
+      const auto faces = boundary->faces_of(nodes_of_set(s));
+      auto& groups = mesh_.face_groups.groups;
+      const auto is_free = [&](long long number) {
+        return number > 0 && number <= std::numeric_limits<int>::max() &&
+               std::ranges::none_of(groups, [&](const Group& other) { return other.number == number; });
+      };
+      long long number = numbers[s];
+      if (!names[s].empty() && !is_free(number))
+        for (number = 1; !is_free(number);) ++number;
+      if (faces.empty() || !is_free(number)) {
+        left_out_.add(faces.empty() ? "node sets of no faces, or of all" : "node sets with the number of a side set");
+        continue;
+      }
+      groups.push_back({names[s], static_cast<int>(number), 2});
+      for (const auto face : faces) add_face(mesh_, face, static_cast<Index>(groups.size() - 1));
     }
+  }
+
+  /// The nodes of a set, each once and ascending.
+  std::vector<Index> nodes_of_set(std::size_t set) const {
+    const std::string suffix = std::to_string(set + 1);
+    const std::size_t size = count_of("num_nod_ns" + suffix);
+    std::vector<Index> nodes;
+    if (size == 0) return nodes;
+    for (const long long node : file_.integers("node_ns" + suffix, size))
+      if (node >= 1 && node <= static_cast<long long>(num_nodes_)) nodes.push_back(static_cast<Index>(node - 1));
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    return nodes;
   }
 
   bool holds_corners_of_group(std::size_t set, long long number) {
@@ -410,12 +435,8 @@ class ExodusParser {
         for (const Index v : mesh_.cell(c).first(num_corners(mesh_.kinds[c])))
           is_corner_[static_cast<std::size_t>(v)] = true;
     }
-    const std::string suffix = std::to_string(set + 1);
-    const std::size_t size = count_of("num_nod_ns" + suffix);
-    if (size == 0) return wanted.empty();
-    for (const long long node : file_.integers("node_ns" + suffix, size))
-      if (node >= 1 && node <= static_cast<long long>(num_nodes_) && is_corner_[static_cast<std::size_t>(node) - 1])
-        found.insert(static_cast<Index>(node - 1));
+    for (const Index node : nodes_of_set(set))
+      if (is_corner_[static_cast<std::size_t>(node)]) found.insert(node);
     return found == wanted;
   }
 

@@ -35,7 +35,8 @@ constexpr InpType kInpTypes[] = {
     {4, CellKind::tet, 1},  {5, CellKind::pyramid, 1}, {6, CellKind::prism, 1}, {8, CellKind::hex, 1},
     {10, CellKind::tet, 2}, {15, CellKind::prism, 2},  {20, CellKind::hex, 2},  {27, CellKind::hex, 2},
 };
-constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
+constexpr const char* kSolidFamilies[] = {"C3D", "DC3D",  "AC3D", "DCC3D", "F3D", "EC3D",
+                                          "Q3D", "EMC3D", "SC",   "CSS"};  // the last two: shells that are solids
 constexpr const char* kShellFamilies[] = {"STRI", "S", "M3D", "R3D", "SFM3D", "DS"};
 
 /// The number of a name such as REFERENCE_7, or REFERENCE_M7 for -7.
@@ -77,19 +78,19 @@ class InpParser {
     const InpType* type;
     std::size_t first_node, num_nodes;
     std::size_t set;  ///< of *ELEMENT, ELSET=; InpSets::kNone if it has none
-    InpPlace place;
+    FilePlace place;
   };
   struct Shell {
     std::size_t end;          ///< of its nodes
     std::size_t set;
-    InpPlace place;
+    FilePlace place;
   };
   struct Side {
     std::int64_t element;  ///< its number, if `set` is InpSets::kNone
     std::size_t set;
     int number;               ///< of the face
     Index surface;            ///< place in the list of groups
-    InpPlace place;
+    FilePlace place;
   };
   static constexpr std::size_t kNone = InpSets::kNone;
 
@@ -205,7 +206,7 @@ class InpParser {
 
   void read_element(const std::vector<std::string>& fields) {
     if (!type_) {
-      ++num_skipped_[skipped_type_];
+      ++(shell_corners_ > 0 ? num_shells_ : num_skipped_)[skipped_type_];
       if (shell_corners_ > 0) read_shell(fields);
       return;
     }
@@ -233,7 +234,9 @@ class InpParser {
   const InpInstance* instance_of_set() const {
     if (line_->instance || !line_->has("INSTANCE")) return line_->instance;
     const InpInstance* instance = lines_of_file_.instance(line_->parameter("INSTANCE"));
-    if (!instance) fail("there is no instance " + in_quotes(line_->parameter("INSTANCE")));
+    // A file without parts may name instances that it was made of.
+    if (!instance && lines_of_file_.has_parts())
+      fail("there is no instance " + in_quotes(line_->parameter("INSTANCE")));
     return instance;
   }
 
@@ -325,8 +328,26 @@ class InpParser {
       mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
   }
 
+  void count_sets_of_shells() {
+    std::set<std::size_t> used;
+    for (const Shell& shell : shells_) used.insert(shell.set);
+    for (std::size_t s = 0; s < node_sets_.size(); ++s) left_out_.add("node sets", node_sets_.is_defined(s));
+    for (std::size_t s = 0; s < element_sets_.size(); ++s)
+      left_out_.add("element sets", element_sets_.is_defined(s) && !used.contains(s));
+  }
+
+  void tell_left_out() {
+    for (const auto& [type, n] : num_skipped_) left_out_.add("elements of type " + type, n);
+    left_out_.tell(mesh_.warnings);
+  }
+
   void build() {
-    if (elements_.empty() && !shells_.empty()) return build_shells();
+    if (elements_.empty() && !shells_.empty()) {
+      build_shells();
+      count_sets_of_shells();
+      tell_left_out();
+      return;
+    }
     std::vector<Index> nodes;
     for (std::size_t e = 0; e < elements_.size(); ++e) {
       const Element& element = elements_[e];
@@ -340,8 +361,8 @@ class InpParser {
     add_node_sets();
     mesh_.face_groups.groups = group_names();
     choose_references();
-    for (const auto& [type, n] : num_skipped_) left_out_.add("elements of type " + type, n);
-    left_out_.tell(mesh_.warnings);
+    for (const auto& [type, n] : num_shells_) num_skipped_[type] += n;
+    tell_left_out();
   }
 
   Index node(const Element& element, std::size_t i, std::size_t e) {
@@ -399,28 +420,15 @@ class InpParser {
     for (std::size_t s = 0; s < node_sets_.size(); ++s)
       if (node_sets_.is_defined(s) && !has_group(node_sets_.name(s))) wanted.push_back(s);
     if (wanted.empty()) return;
-    const std::vector<std::array<Index, 4>> boundary = boundary_faces();
-    std::vector<std::vector<Index>> faces_at(mesh_.positions.size());
-    for (std::size_t f = 0; f < boundary.size(); ++f) faces_at[boundary[f][0]].push_back(static_cast<Index>(f));
-    std::vector<std::size_t> in_set(mesh_.positions.size(), kNone);
-    std::vector<Index> faces;
+    BoundaryOfNodes boundary(mesh_);
     for (const std::size_t s : wanted) {
-      const std::vector<Index>& members = node_sets_.members(s);
-      for (const Index v : members) in_set[v] = s;
-      faces.clear();
-      for (const Index v : members)
-        for (const Index f : faces_at[v])
-          if (std::ranges::all_of(boundary[f], [&](Index w) { return w == kNoIndex || in_set[w] == s; }))
-            faces.push_back(f);
-      if (faces.empty() || faces.size() == boundary.size()) {
+      const auto faces = boundary.faces_of(node_sets_.members(s));
+      if (faces.empty()) {
         left_out_.add("node sets of no faces, or of all");
         continue;
       }
       const Index group = faces_.by_name(node_sets_.name(s));
-      for (const Index f : faces) {
-        const std::size_t size = boundary[f][3] == kNoIndex ? 3 : 4;
-        add_face(mesh_, std::span(boundary[f]).first(size), group);
-      }
+      for (const std::span<const Index> face : faces) add_face(mesh_, face, group);
     }
   }
 
@@ -432,26 +440,6 @@ class InpParser {
                                         (group.name.empty() && is_name("GROUP_" + std::to_string(group.number)));
                                }) ||
            std::ranges::any_of(plain_names_, [&](const auto& plain) { return is_name(plain.second); });
-  }
-
-  /// The faces of one cell, by their corners; the fourth of a triangle is kNoIndex.
-  std::vector<std::array<Index, 4>> boundary_faces() const {
-    const auto tables = faces_by_kind(inp_faces);
-    std::vector<std::pair<FaceKey, std::array<Index, 4>>> faces;
-    for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
-      for (const std::vector<int>& local : tables[static_cast<std::size_t>(mesh_.kinds[c])]) {
-        std::array<Index, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
-        for (std::size_t i = 0; i < local.size(); ++i) corners[i] = mesh_.cell(c)[static_cast<std::size_t>(local[i])];
-        faces.emplace_back(face_key(std::span(corners).first(local.size())), corners);
-      }
-    std::sort(faces.begin(), faces.end());
-    std::vector<std::array<Index, 4>> boundary;
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      const bool is_twin = (i > 0 && faces[i - 1].first == faces[i].first) ||
-                           (i + 1 < faces.size() && faces[i + 1].first == faces[i].first);
-      if (!is_twin) boundary.push_back(faces[i].second);
-    }
-    return boundary;
   }
 
   void add_side(const Side& side, std::size_t element) {
@@ -524,7 +512,7 @@ class InpParser {
 
   InpLines lines_of_file_;
   const InpLine* line_ = nullptr;
-  InpPlace place_;  ///< of what is read or built, for messages
+  FilePlace place_;  ///< of what is read or built, for messages
   std::unordered_map<std::int64_t, Index> nodes_, elements_by_label_;
   InpSets element_sets_, node_sets_;
   NodalMesh mesh_;
@@ -535,7 +523,8 @@ class InpParser {
   std::vector<Shell> shells_;
   std::vector<std::int64_t> shell_nodes_;            ///< corners
   std::size_t shell_corners_ = 0;                    ///< of the elements being read; 0: no shells
-  std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types
+  std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types, but for
+  std::map<std::string, std::size_t> num_shells_;    ///< those of shells
   std::vector<std::size_t> sections_;                ///< their sets of elements
   GroupList faces_;
   std::map<Index, std::string> plain_names_;  ///< of surfaces of instances, without the instance

@@ -152,9 +152,17 @@ NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, co
   return mesh;
 }
 
+void internal::fail_without_cells(const std::string& name, const std::vector<std::string>& warnings) {
+  constexpr std::string_view kKnown = "in the file, but ";  // is said already
+  std::string found;
+  for (const std::string& warning : warnings)
+    found += "; " + (warning.starts_with(kKnown) ? warning.substr(kKnown.size()) : warning);
+  throw InputError(name + ": no hexes, prisms, tets or pyramids in the file" + found);
+}
+
 NodalMesh read_nodal_mesh(const fs::path& path, const std::string& references) {
   NodalMesh mesh = parse_nodal(path, read_file(path), references);
-  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms, tets or pyramids in the file");
+  if (mesh.num_cells() == 0) fail_without_cells(path.string(), mesh.warnings);
   return mesh;
 }
 

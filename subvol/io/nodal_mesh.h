@@ -38,7 +38,7 @@ struct NodalMesh {
   std::vector<Group> regions;              ///< names of references, where there are any
   VolumeFaceGroups face_groups;            ///< by the corners of faces
   PolygonMesh shells;                      ///< without cells: elements of two dimensions by their corners, which are
-                                           ///< numbers of nodes; it has no positions of its own (.msh, .inp)
+                                           ///< numbers of nodes; it has no positions of its own (.msh, .inp, .bdf)
   NodeSpacing spacing = NodeSpacing::equal;
   std::vector<std::string> warnings;       ///< without the file's name
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/cell_orientation.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/mesh_formats.h"
+#include "subvol/io/nastran_cards.h"
+#include "subvol/io/nastran_points.h"
 #include "subvol/io/nodal_formats.h"
 
 #include <algorithm>
@@ -13,31 +16,6 @@
 namespace subvol::internal {
 
 namespace {
-
-/// Replaces tabs by blanks up to the next column of eight.
-std::string without_tabs(std::string_view line) {
-  std::string result;
-  for (const char c : line) {
-    if (c != '\t') result += c;
-    else result.append(8 - result.size() % 8, ' ');
-  }
-  return result;
-}
-
-/// A number of Nastran: "1.5", "1.5E+3", "1.5D3", and "1.5+3" without a letter.
-std::optional<double> nastran_number(const std::string& field) {
-  std::string text;
-  for (std::size_t i = 0; i < field.size(); ++i) {
-    const char c = field[i];
-    const bool is_letter = c == 'd' || c == 'D' || c == 'e' || c == 'E';
-    const bool is_sign = (c == '+' || c == '-') && i > 0 && text.back() != 'e';
-    if (is_sign) text += 'e';
-    text += is_letter ? 'e' : c;
-  }
-  if (text.starts_with("+")) text.erase(0, 1);
-  if (const std::size_t plus = text.find("e+"); plus != std::string::npos) text.erase(plus + 1, 1);
-  return parse_number(text);
-}
 
 /// A solid of Nastran. place[i]: the card's number of node i of `NodeOrdering::vtk`.
 struct SolidCard {
@@ -59,147 +37,102 @@ const std::vector<SolidCard>& solid_cards() {
   return kCards;
 }
 
-/// Rigid elements. All other elements have names that begin with a C, as have the cards of coordinate systems (CORD2R
-/// and so on) and the end of the executive section (CEND).
+/// Elements whose names do not begin with a C, and cards that are no elements although theirs do, besides those of
+/// coordinate systems and of the panels of aerodynamics.
 constexpr const char* kRigidElements[] = {"rbe1", "rbe2", "rbe3", "rbar", "rrod"};
+constexpr const char* kNoElements[] = {"campbll", "cbarao", "cend",    "cload", "conv",   "convm", "creep", "cset",
+                                       "cset1",   "csuper", "csupext", "cyax",  "cyjoin", "cysup", "cysym"};
 bool is_other_element(std::string_view name) {
-  if (name.starts_with("c")) return !name.starts_with("cord") && name != "cend";
-  return std::find(std::begin(kRigidElements), std::end(kRigidElements), name) != std::end(kRigidElements);
+  const auto is_in = [&](const auto& names) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+  };
+  if (!name.starts_with("c")) return is_in(kRigidElements);
+  const auto is_sign = [](char c) { return !(c >= 'a' && c <= 'z') && !(c >= '0' && c <= '9'); };
+  return !name.starts_with("cord") && !name.starts_with("caero") && !is_in(kNoElements) &&
+         std::none_of(name.begin(), name.end(), is_sign);
 }
 
 class NastranParser {
  public:
-  NastranParser(const std::string& name, std::string_view bytes)
-      : lines_(name, bytes, TextScanner::Comments::none), name_(name), cells_(mesh_) {}
+  NastranParser(const std::string& name, std::string_view bytes) : cards_(name, bytes), cells_(mesh_) {}
 
   NodalMesh parse() {
-    while (const auto line = lines_.line()) read_line(*line);
-    end_card();
+    cards_.visit([this](const NastranCard& card) { read(card); });
     build();
     return std::move(mesh_);
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what, std::size_t line) const {
-    throw InputError(name_ + ":" + std::to_string(line) + ": " + what);
-  }
-  [[noreturn]] void fail(const std::string& what) const { fail(what, card_line_); }
+  struct Element {
+    const SolidCard* solid;  ///< null: a face
+    std::int64_t property;
+    std::vector<std::int64_t> nodes;  ///< 0: left out
+    FilePlace place;
+  };
 
-  // --- Cards ----------------------------------------------------------------------------------------------------------
-
-  void read_line(std::string_view whole) {
-    const std::string line = without_tabs(whole.substr(0, whole.find('$')));
-    if (trimmed(line).empty() || is_over_) return;
-    const std::vector<std::string> fields = fields_of(line);
-    std::string name = lower_case(fields[0]);
-    if (name.ends_with('*')) name.pop_back();
-    const bool continues = name.empty() || name[0] == '+' || name[0] == '*';
-    if (continues && in_card_) {
-      card_.insert(card_.end(), fields.begin() + 1, fields.end());
-      return;
-    }
-    if (continues) return;
-    end_card();
-    if (name == "enddata") is_over_ = true;
-    card_ = fields;
-    card_[0] = name;
-    card_line_ = lines_.word_line();
-    in_card_ = true;
-  }
-
-  /// The name and the data of a line: eight of them, or four of a line of large fields. A field for continuations at
-  /// the end of a line is dropped.
-  static std::vector<std::string> fields_of(const std::string& line) {
-    std::vector<std::string> fields;
-    if (line.find(',') != std::string::npos) {
-      std::size_t at = 0;
-      while (at <= line.size()) {
-        const std::size_t end = std::min(line.find(',', at), line.size());
-        fields.push_back(trimmed(std::string_view(line).substr(at, end - at)));
-        at = end + 1;
-      }
-      const std::size_t most = fields[0].find('*') == std::string::npos ? 9 : 5;
-      fields.resize(most);
-      return fields;
-    }
-    fields.push_back(trimmed(std::string_view(line).substr(0, 8)));
-    const bool is_large = fields[0].find('*') != std::string::npos;
-    const std::size_t width = is_large ? 16 : 8, count = is_large ? 4 : 8;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t begin = 8 + i * width;
-      fields.push_back(begin < line.size() ? trimmed(std::string_view(line).substr(begin, width)) : std::string());
-    }
-    return fields;
-  }
-
-  void end_card() {
-    if (!in_card_) return;
-    in_card_ = false;
-    const std::string& name = card_[0];
+  void read(const NastranCard& card) {
+    const std::string& name = card.name();
     const auto solid = std::find_if(solid_cards().begin(), solid_cards().end(),
-                                    [&](const SolidCard& card) { return lower_case(card.name) == name; });
-    if (name == "grid") read_grid();
-    else if (solid != solid_cards().end()) read_solid(*solid);
-    else if (name == "cquad4" || name == "cquad8" || name == "cquadr") read_shell(4);
-    else if (name == "ctria3" || name == "ctria6" || name == "ctriar")
-      read_shell(3);
-    else if (name == "include" || name.starts_with("include ")) fail("INCLUDE is not followed: put the files together");
-    else if (name == "grdset") fail("GRDSET is not read: write the coordinate systems of the points themselves");
-    else if (is_other_element(name))
-      ++num_others_;
+                                    [&](const SolidCard& known) { return lower_case(known.name) == name; });
+    if (name == "grid") {
+      require_whole(card);
+      points_.add_point(card);
+    } else if (solid != solid_cards().end()) {
+      read_solid(card, *solid);
+    } else if (name == "cquad4" || name == "cquad8" || name == "cquadr") {
+      read_shell(card, 4);
+    } else if (name == "ctria3" || name == "ctria6" || name == "ctriar") {
+      read_shell(card, 3);
+    } else if (name == "grdset") {
+      points_.set_defaults(card);
+    } else if (name.size() == 6 && name.starts_with("cord") && (name[4] == '1' || name[4] == '2')) {
+      points_.add_system(card);
+    } else if (name.starts_with("begin")) {
+      if (points_.empty() && elements_.empty())
+        left_out_ = {};  // words of the executive and case control sections
+      else
+        begin_ = card.place.line;
+    } else if (is_other_element(name)) {
+      left_out_.add("elements of type " + upper_case(name));
+    }
   }
 
-  const std::string& field(std::size_t i) const {
-    static const std::string kNone;
-    return i < card_.size() ? card_[i] : kNone;
-  }
-
-  std::int64_t whole(std::size_t i, const char* what) const {
-    const auto value = parse_integer(field(i));
-    if (!value || *value <= 0)
-      fail(std::string("expected ") + what + " (a positive whole number), found " + in_quotes(field(i)));
-    return *value;
+  /// Throws InputError if lines of the card are missing, or if it is in a section with numbers of its own.
+  void require_whole(const NastranCard& card) const {
+    if (!card.broken.empty())
+      card.fail("the continuation " + in_quotes(card.broken) +
+                " below it belongs to another card: expected every "
+                "continuation right behind its line");
+    if (begin_ != 0)
+      card.fail("in the section that begins in line " + std::to_string(begin_) +
+                ", as of a superelement, numbers of "
+                "points start anew: put each section into a file of its own");
   }
 
   /// Some programs leave the property out.
-  std::int64_t property() const { return field(2).empty() ? 0 : whole(2, "the number of a property"); }
-
-  void read_grid() {
-    const std::int64_t number = whole(1, "the number of a point");
-    if (const auto system = parse_integer(field(2)); !field(2).empty() && (!system || *system != 0))
-      fail("GRID " + std::to_string(number) + " is in coordinate system " + in_quotes(field(2)) +
-           "; expected the basic system");
-    Vec3 p = Vec3::Zero();
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (field(3 + k).empty()) continue;
-      const auto value = nastran_number(field(3 + k));
-      if (!value) fail("expected a coordinate (a finite number), found " + in_quotes(field(3 + k)));
-      p[static_cast<Eigen::Index>(k)] = *value;
-    }
-    if (!points_.try_emplace(number, static_cast<Index>(mesh_.positions.size())).second)
-      fail("a second GRID " + std::to_string(number));
-    mesh_.positions.push_back(p);
+  static std::int64_t property(const NastranCard& card) {
+    return card.field(2).empty() ? 0 : card.positive(2, "the number of a property");
   }
 
-  struct Element {
-    const SolidCard* solid;           ///< null: a face
-    std::int64_t property;
-    std::vector<std::int64_t> nodes;  ///< 0: left out
-    std::size_t line;
-  };
-
-  void read_solid(const SolidCard& solid) {
-    Element element{&solid, property(), {}, card_line_};
+  void read_solid(const NastranCard& card, const SolidCard& solid) {
+    require_whole(card);
+    constexpr std::size_t kPyramidMiddles = 8;
+    if (solid.kind == CellKind::pyramid && !card.field(kPyramidMiddles).empty() && card.field(kPyramidMiddles) != "0")
+      card.fail(std::string("a curved pyramid: ") + kNoCurvedPyramids);
+    Element element{&solid, property(card), {}, card.place};
     for (std::size_t i = 0; i < solid.num_nodes; ++i) {
-      const bool is_corner = i < solid.num_corners, is_blank = field(3 + i).empty() || field(3 + i) == "0";
-      element.nodes.push_back(!is_corner && is_blank ? 0 : whole(3 + i, "the number of a point"));
+      const bool is_corner = i < solid.num_corners, is_blank = card.field(3 + i).empty() || card.field(3 + i) == "0";
+      element.nodes.push_back(!is_corner && is_blank ? 0 : card.positive(3 + i, "the number of a point"));
     }
     elements_.push_back(std::move(element));
+    ++num_solids_;
   }
 
-  void read_shell(std::size_t num_corners) {
-    Element element{nullptr, property(), {}, card_line_};
-    for (std::size_t i = 0; i < num_corners; ++i) element.nodes.push_back(whole(3 + i, "the number of a point"));
+  void read_shell(const NastranCard& card, std::size_t num_corners) {
+    require_whole(card);
+    Element element{nullptr, property(card), {}, card.place};
+    for (std::size_t i = 0; i < num_corners; ++i)
+      element.nodes.push_back(card.positive(3 + i, "the number of a point"));
     elements_.push_back(std::move(element));
   }
 
@@ -207,10 +140,10 @@ class NastranParser {
 
   Index point(const Element& element, std::size_t i) const {
     const auto found = points_.find(element.nodes[i]);
-    if (found == points_.end())
-      fail("an element names GRID " + std::to_string(element.nodes[i]) + ", which the file does not have",
-           element.line);
-    return found->second;
+    if (!found)
+      fail_at(element.place,
+              "an element names GRID " + std::to_string(element.nodes[i]) + ", which the file does not have");
+    return *found;
   }
 
   static int number_of(std::int64_t property) {
@@ -218,24 +151,42 @@ class NastranParser {
   }
 
   void build() {
+    mesh_.positions = points_.positions();
+    left_out_.tell(mesh_.warnings);
+    if (num_solids_ == 0) return build_shells();
     GroupList faces;
-    std::vector<Index> corners;
     for (const Element& element : elements_) {
       if (element.solid) {
         add_solid(element);
         mesh_.references.push_back(number_of(element.property));
-        continue;
+      } else {
+        add_face(mesh_, corners_of(element), faces.by_number(number_of(element.property)));
       }
-      corners.clear();
-      for (std::size_t i = 0; i < element.nodes.size(); ++i) corners.push_back(point(element, i));
-      add_face(mesh_, corners, faces.by_number(number_of(element.property)));
     }
     const auto is_one = [](int reference) { return reference == 1; };  // which all have that have none
     if (std::all_of(mesh_.references.begin(), mesh_.references.end(), is_one)) mesh_.references.clear();
     mesh_.face_groups.groups = faces.take();
-    LeftOut left_out;
-    left_out.add("other elements", num_others_);
-    left_out.tell(mesh_.warnings);
+    if (const std::size_t n = turn_cells_alike(mesh_))
+      mesh_.warnings.push_back(std::to_string(n) +
+                               " cells are numbered left-handed, as Nastran permits: their nodes are numbered anew");
+  }
+
+  /// Without cells, shells are a surface, whose groups are their properties.
+  void build_shells() {
+    GroupList groups;
+    std::vector<Index> of_face;
+    for (const Element& element : elements_) {
+      for (const Index corner : corners_of(element)) mesh_.shells.face_vertices.push_back(corner);
+      mesh_.shells.face_offsets.push_back(mesh_.shells.face_vertices.size());
+      of_face.push_back(groups.by_number(number_of(element.property)));
+    }
+    if (groups.groups().size() > 1) mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
+  }
+
+  std::vector<Index> corners_of(const Element& face) const {
+    std::vector<Index> corners;
+    for (std::size_t i = 0; i < face.nodes.size(); ++i) corners.push_back(point(face, i));
+    return corners;
   }
 
   /// An edge without its middle is straight, if others of the cell have theirs.
@@ -266,14 +217,13 @@ class NastranParser {
     return known->second;
   }
 
-  TextScanner lines_;
-  std::string name_;
+  NastranCards cards_;
   NodalMesh mesh_;
   NodalCells cells_;
-  std::vector<std::string> card_;
-  std::size_t card_line_ = 0, num_others_ = 0;
-  bool in_card_ = false, is_over_ = false;
-  std::unordered_map<std::int64_t, Index> points_;
+  NastranPoints points_;
+  LeftOut left_out_;
+  std::size_t num_solids_ = 0;
+  std::size_t begin_ = 0;  ///< line of the BEGIN of a further section; 0: none
   std::map<std::pair<Index, Index>, Index> middles_;
   std::vector<Element> elements_;
 };

@@ -133,4 +133,38 @@ std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, 
   return groups;
 }
 
+BoundaryOfNodes::BoundaryOfNodes(const NodalMesh& mesh)
+    : faces_at_(mesh.positions.size()), in_set_(mesh.positions.size(), 0) {
+  const auto tables = faces_by_kind(inp_faces);
+  std::vector<std::pair<FaceKey, std::array<Index, 4>>> faces;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    for (const std::vector<int>& local : tables[static_cast<std::size_t>(mesh.kinds[c])]) {
+      std::array<Index, 4> corners{kNoIndex, kNoIndex, kNoIndex, kNoIndex};
+      for (std::size_t i = 0; i < local.size(); ++i) corners[i] = mesh.cell(c)[static_cast<std::size_t>(local[i])];
+      faces.emplace_back(face_key(std::span(corners).first(local.size())), corners);
+    }
+  std::sort(faces.begin(), faces.end());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const bool is_twin = (i > 0 && faces[i - 1].first == faces[i].first) ||
+                         (i + 1 < faces.size() && faces[i + 1].first == faces[i].first);
+    if (is_twin) continue;
+    faces_at_[static_cast<std::size_t>(faces[i].second[0])].push_back(static_cast<Index>(faces_.size()));
+    faces_.push_back(faces[i].second);
+  }
+}
+
+std::vector<std::span<const Index>> BoundaryOfNodes::faces_of(std::span<const Index> nodes) {
+  ++num_calls_;
+  for (const Index v : nodes) in_set_[static_cast<std::size_t>(v)] = num_calls_;
+  const auto is_in = [&](Index v) { return v == kNoIndex || in_set_[static_cast<std::size_t>(v)] == num_calls_; };
+  std::vector<std::span<const Index>> found;
+  for (const Index v : nodes)
+    for (const Index f : faces_at_[static_cast<std::size_t>(v)]) {
+      const std::array<Index, 4>& face = faces_[static_cast<std::size_t>(f)];
+      if (std::ranges::all_of(face, is_in)) found.push_back(std::span(face).first(face[3] == kNoIndex ? 3 : 4));
+    }
+  if (found.size() == faces_.size()) found.clear();
+  return found;
+}
+
 }  // namespace subvol::internal

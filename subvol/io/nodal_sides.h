@@ -57,4 +57,20 @@ struct GroupSides {
 /// with_centers  true: the centers of quads of order 2 are nodes, too.
 std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, bool with_centers);
 
+/// Finds the faces of the boundary (those of one cell) that a set of nodes stands for.
+class BoundaryOfNodes {
+ public:
+  explicit BoundaryOfNodes(const NodalMesh& mesh);
+
+  /// Returns the corners of each face whose corners are all in the set; none if these are all faces of the boundary.
+  /// They are valid as long as this object is. nodes: numbers of nodes, each once.
+  std::vector<std::span<const Index>> faces_of(std::span<const Index> nodes);
+
+ private:
+  std::vector<std::array<Index, 4>> faces_;   ///< by their corners; the fourth of a triangle is kNoIndex
+  std::vector<std::vector<Index>> faces_at_;  ///< of each node that is the first corner of some
+  std::vector<std::size_t> in_set_;           ///< number of the last call with this node
+  std::size_t num_calls_ = 0;
+};
+
 }  // namespace subvol::internal

@@ -2,6 +2,7 @@
 // Warnings say which groups and names of a mesh an output loses.
 
 #include "cli/runs/losses.h"
+#include "cli/runs/written_result.h"
 #include "tests/support/grouped_meshes.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
@@ -90,4 +91,18 @@ TEST_CASE("Names that a format leaves out or alters are told once for each outpu
   surface.face_groups.groups = {{"inlet", 1, 2}};
   CHECK(has(only("a.ply", cli::marks_of(surface)), "1 name left out, the first \"inlet\""));
   CHECK(told_of_losses(cli::marks_of(surface), "a.vtp").empty());
+}
+
+TEST_CASE("a warning of polynomial cells that are not valid says what is wrong with them", "[cli][quick]") {
+  cli::PolynomialCells cells{.file = "a.inp", .is_close = true};
+  cells.check.quality.emplace();
+  cells.check.quality->num_cells = 25;
+  cells.check.intersecting_faces = {{0, 1}, {0, 2}};
+  const std::vector<std::string> meeting = cli::polynomial_cells_warnings(cells);
+  REQUIRE(meeting.size() == 1);
+  CHECK(has(meeting[0], "not valid: 2 pairs of faces of their boundary meet"));
+  cells.check.quality->certificate.not_certified = {3};
+  const std::vector<std::string> inverted = cli::polynomial_cells_warnings(cells);
+  REQUIRE(inverted.size() == 1);
+  CHECK(has(inverted[0], "not valid: 1 of 25 are not certified"));
 }

@@ -342,3 +342,18 @@ TEST_CASE("curved_file: reported files are read exactly", "[export]") {
   CHECK((hex.mesh.position(0, {0.5, 0, 0}) - Vec3(0.5, 0, 0)).norm() < 1e-14);
   CHECK((hex.mesh.position(0, {1, 1, 0.5}) - Vec3(1.35, 1.1, 0.5)).norm() < 1e-14);
 }
+
+TEST_CASE("faces of groups that are faces of no curved cell are dropped with a warning", "[export][quick]") {
+  std::string text =
+      "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nGRID,5,,.5,.1,.1\nGRID,6,,9.,0.,0.\n"
+      "CTETRA,1,1,1,2,3,4,5\nCTRIA3,2,8,1,2,6\n";
+  const TemporaryFolder folder;
+  std::vector<std::string> warnings;
+  CHECK(read_curved(folder.file("a.bdf", text), &warnings).face_groups.empty());
+  REQUIRE(warnings.size() == 1);
+  CHECK(warnings[0].ends_with("a.bdf: 1 faces with a group are faces of no cell: dropped"));
+  text += "CTRIA3,3,7,1,2,3\n";
+  warnings.clear();
+  CHECK(read_curved(folder.file("b.bdf", text), &warnings).face_groups.faces.size() == 1);
+  CHECK(warnings.size() == 1);
+}

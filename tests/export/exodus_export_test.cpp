@@ -71,6 +71,30 @@ TEST_CASE("exodus: cells, references, regions and groups of all kinds come back"
   CHECK_THROWS_AS(require_written(folder / "a.e", other), IoError);
 }
 
+TEST_CASE("exodus: a node set without a side set becomes a group of the faces whose corners it holds", "[export]") {
+  if (is_missing()) return;
+  const VolumeMesh mesh = with_floor_and_roof(lattice(2, 2, 2), 2);
+  const TemporaryFolder folder;
+  write_volume(folder / "a.e", mesh);
+  std::string bytes = content_of(folder / "a.e");
+  bytes.replace(bytes.find("floor"), 5, "slabs");  // of the side set or the node set
+  std::vector<std::string> warnings;
+  const VolumeMesh found = read_volume_mesh(folder.file("b.e", bytes), {.warnings = &warnings});
+  CHECK(warnings.empty());
+  const auto faces_of = [&](const VolumeMesh& cells, const std::string& name) {
+    const auto& groups = cells.face_groups.groups;
+    const auto group = std::ranges::find_if(groups, [&](const Group& other) { return other.name == name; });
+    REQUIRE(group != groups.end());
+    std::vector<std::array<Index, 4>> faces;
+    for (const GroupedFace& face : cells.face_groups.faces)
+      if (face.group == group - groups.begin()) faces.push_back(face.face);
+    return faces;
+  };
+  CHECK(found.face_groups.groups.size() == mesh.face_groups.groups.size() + 1);
+  CHECK(faces_of(found, "floor") == faces_of(mesh, "floor"));
+  CHECK(faces_of(found, "slabs") == faces_of(mesh, "floor"));
+}
+
 TEST_CASE("exodus: a mesh without references and groups has none after reading", "[export]") {
   if (is_missing()) return;
   const TemporaryFolder folder;

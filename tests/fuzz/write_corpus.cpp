@@ -87,6 +87,9 @@ void write_variants(const fs::path& folder) {
         "1,1,2,3,4\n*NSET,NSET=n\n1,2,3\n*END PART\n*ASSEMBLY,NAME=a\n*INSTANCE,NAME=p-1,PART=p\n"
         "*END INSTANCE\n*INSTANCE,NAME=p-2,PART=p\n2,0,0\n2,0,0,2,0,1,90\n*END INSTANCE\n"
         "*NSET,NSET=h,INSTANCE=p-2\n1\n*SURFACE,NAME=f\np-1.e,S1\np-2.1,S2\n*END ASSEMBLY\n");
+  write(folder / "bdf", "systems",
+        "CORD2C,5,0,1.,2.,3.,2.,2.,3.\n,1.,3.,3.\nCORD1S,6,1,2,3\nGRDSET,,5\nGRID,1,0,0.,0.,0.\nGRID,2,0,1.,0.,0.\n"
+        "=,*(1),=,=,*(1.),=\nGRID,4,6,1.,90.,0.\nCTETRA,1,1,1,2,3,4\n=,*(1),==\n=(2)\nBEGIN BULK\nENDDATA\n");
   write(folder / "bdf", "fields", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID           3              0.    1.+0\n"
                                   "GRID*                  4\n*                      1.\nCTETRA,1,1,1,2,3,4\n"
                                   "CTRIA3,2,5,1,2,3\n");

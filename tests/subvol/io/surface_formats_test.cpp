@@ -476,4 +476,11 @@ TEST_CASE("surface formats: elements of two dimensions in a .msh or .inp without
                            "*ELEMENT,TYPE=S4R,ELSET=right\n2,2,4,3,1\n"));
   CHECK(std::get<PolygonMesh>(inp).face_groups.groups == std::vector<Group>{{"left", 1, 2}, {"right", 2, 2}});
   CHECK_THROWS_WITH(read_volume_mesh(format_folder() / "a.msh"), Contains("faces without cells"));
+  std::vector<std::string> warnings;
+  read_cells(format_folder().file("b.inp",
+                                  "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*ELEMENT,TYPE=S3,ELSET=left\n1,1,2,3\n"
+                                  "*ELEMENT,TYPE=B31\n2,1,2\n*NSET,NSET=n\n1\n*ELSET,ELSET=e\n1\n*MATERIAL\n"),
+             {.warnings = &warnings});
+  REQUIRE(warnings.size() == 1);
+  CHECK(warnings[0].ends_with("1 keywords *MATERIAL, 1 node sets, 1 element sets, 1 elements of type B31"));
 }
