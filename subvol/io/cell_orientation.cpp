@@ -7,8 +7,7 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
-#include <unordered_map>
+#include <tuple>
 #include <utility>
 #include <vector>
 
