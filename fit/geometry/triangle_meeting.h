@@ -12,7 +12,7 @@ enum class MeetingKind {
   crossing,  ///< each has corners strictly on both sides of the other
   face,      ///< they overlap in one plane
   edge,      ///< an edge of one lies on the other
-  vertex     ///< a corner of one lies on the other
+  vertex     ///< they have one point in common: a corner of one lies on the other, or two edges cross
 };
 
 struct TriangleMeeting {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/geometry/triangle_meeting.h"
 
+#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <Eigen/Geometry>
 
@@ -13,6 +14,7 @@ namespace subvol::internal {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using ExactKernel = CGAL::Exact_predicates_exact_constructions_kernel;
 using Corners = std::array<Vec3, 3>;
 
 Kernel::Point_3 point(const Vec3& p) { return {p[0], p[1], p[2]}; }
@@ -83,10 +85,27 @@ void add_crossings(const Corners& a, const Corners& b, std::vector<Vec3>& places
     }
 }
 
+/// True if two triangles, each of which straddles the other's plane, have only the crossing of two edges in common.
+bool meet_at_edges_only(const Corners& a, const Corners& b) {
+  for (std::size_t e = 0; e < 3; ++e)
+    for (std::size_t f = 0; f < 3; ++f) {
+      const Vec3 &p = a[e], &q = a[(e + 1) % 3], &r = b[f], &s = b[(f + 1) % 3];
+      if (CGAL::orientation(point(p), point(q), point(r), point(s)) != CGAL::COPLANAR) continue;
+      // If edges lie in one plane, they may cross at the end of a stretch that both triangles hold, or be all of it.
+      const auto triangle = [](const Corners& t) {
+        const auto exact = [](const Vec3& x) { return ExactKernel::Point_3(x[0], x[1], x[2]); };
+        return ExactKernel::Triangle_3(exact(t[0]), exact(t[1]), exact(t[2]));
+      };
+      const auto common = CGAL::intersection(triangle(a), triangle(b));
+      return common && boost::get<ExactKernel::Point_3>(&*common) != nullptr;
+    }
+  return false;
+}
+
 MeetingKind kind_of(const Corners& a, const Corners& b, const Sides& of_a, const Sides& of_b) {
   if (of_a.num_on_plane == 3 || of_b.num_on_plane == 3)
     return separated_by_edge(a, b) || separated_by_edge(b, a) ? MeetingKind::edge : MeetingKind::face;
-  if (of_a.straddles && of_b.straddles) return MeetingKind::crossing;
+  if (of_a.straddles && of_b.straddles) return meet_at_edges_only(a, b) ? MeetingKind::vertex : MeetingKind::crossing;
   const bool by_edge = (!of_a.straddles && of_a.num_on_plane == 2) || (!of_b.straddles && of_b.num_on_plane == 2);
   return by_edge ? MeetingKind::edge : MeetingKind::vertex;
 }

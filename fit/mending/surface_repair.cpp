@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/contact_imprint.h"
 #include "subvol/fit/geometry/hole_covers.h"
 #include "subvol/fit/mending/fins.h"
 #include "subvol/fit/mending/mend_surface.h"
@@ -236,6 +237,20 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
 }
 
+/// Returns the surface with contacts of faces that are cut into equal triangles, if sheets or parts make regions and
+/// nothing else is in the way of telling them apart.
+std::optional<TriangleMesh> with_common_contacts(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
+                                                 const std::function<bool()>& cancelled, RegionRule rule) {
+  if (!diagnosis.find(SurfaceFault::face_contact) || diagnosis.find(SurfaceFault::crossing)) return std::nullopt;
+  if (!diagnosis.find(SurfaceFault::interface) && rule != RegionRule::keep) return std::nullopt;
+  std::optional<TriangleMesh> common = imprinted_contacts(given, cancelled);
+  if (!common) return std::nullopt;
+  const SurfaceDiagnosis after = diagnose(*common, cancelled);
+  const bool is_clear = !after.is_cancelled && !after.find(SurfaceFault::face_contact) &&
+                        !after.find(SurfaceFault::crossing) && num_obstacles(after) < num_obstacles(diagnosis);
+  return is_clear ? std::move(common) : std::nullopt;
+}
+
 /// `repair_surface`, whose result counts only if it was not cancelled.
 SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
@@ -248,6 +263,13 @@ SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& c
           formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
       return repair;
     }
+  if (const std::optional<TriangleMesh> common = with_common_contacts(given, diagnosis, cancelled, rule)) {
+    SurfaceRepair repair = repaired(*common, cancelled, rule);
+    const SurfaceFinding& contacts = *diagnosis.find(SurfaceFault::face_contact);
+    repair.done.insert(repair.done.begin(),
+                       "target: " + to_text(contacts, diagnosis.diagonal) + "; they are cut along each other's edges");
+    return repair;
+  }
   if (std::optional<TidySurface> tidy = tidy_surface(given, diagnosis)) {
     SurfaceRepair repair = repaired(tidy->surface, cancelled, rule);
     repair.done.insert(repair.done.begin(), tidy->done.begin(), tidy->done.end());

@@ -17,7 +17,7 @@ namespace subvol {
 /// A surface made ready to be filled, and what was done to it.
 struct SurfaceRepair {
   TriangleMesh surface;
-  std::optional<RegionSurface> regions;  ///< of the surface, if there are several; it is as it was given then
+  std::optional<RegionSurface> regions;  ///< of the surface, if there are several
   std::vector<std::string> done;   ///< a sentence for each repair; empty: the surface is as it was given
   std::vector<std::string> notes;  ///< a sentence for each fault that was left: contacts, pinholes, crossings
   bool is_fillable = false;        ///< no fault that `prevents_filling` is left but pinholes, which filling closes
@@ -30,6 +30,9 @@ struct SurfaceRepair {
 ///
 /// First, repeated triangles are dropped, triangles that disagree with their part are turned, and triangles are cut
 /// where vertices of others lie on their open edges (`tidy_surface`).
+///
+/// Faces that touch but are cut into other triangles are cut along each other's edges (`imprinted_contacts`) if sheets
+/// divide the inside, or if RegionRule::keep is given: the solids that touch there become regions.
 ///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that

@@ -36,7 +36,8 @@ TEST_CASE("Shells of real parts that need a repair say what was done", "[cli][sl
   const auto data = subvol::test::require_data();
   if (!data) return;
   const Workplace place;
-  for (const char* name : {"reported/50-angle_block.stl", "reported/50-z-axis-top.stl"}) {
+  for (const char* name : {"auto/parts/T8_Nut_Block_x1.stl", "reported/50-z-axis-top.stl"}) {
+    if (!std::filesystem::exists(*data / name)) continue;
     const std::string words =
         "shell " + (*data / name).string() + " --thickness 1% --straight --force -o a.vtu --report r.json";
     const Run run = place.run(words);
@@ -49,7 +50,7 @@ TEST_CASE("Shells of real parts that need a repair say what was done", "[cli][sl
     const Run refused = place.run(words + " --repair 0");
     CAPTURE(refused.err);
     CHECK(refused.status == 3);
-    CHECK((has(refused.err, "(0.") || has(refused.err, "(33")));  // coordinates
+    CHECK((has(refused.err, " at (245.") || has(refused.err, "(33")));  // coordinates
   }
 }
 

@@ -231,8 +231,9 @@ TEST_CASE("Messages name vertices by the numbers that the caller gives, and thei
 TEST_CASE("Real parts that were refused get shells after a repair", "[mending][slow]") {
   const auto data = require_data();
   if (!data) return;
-  for (const char* name : {"reported/50-angle_block.stl", "reported/50-z-axis-top.stl",
-                           "auto/parts/T8_Nut_Block_x1.stl", "auto/parts/fan-shroud.stl",
+  // Rounding errors of zero are no faults: readers make one vertex of places that differ by nothing else.
+  CHECK(find_faults(read_polygon_mesh(*data / "reported/50-angle_block.stl")).none());
+  for (const char* name : {"reported/50-z-axis-top.stl", "auto/parts/T8_Nut_Block_x1.stl", "auto/parts/fan-shroud.stl",
                            "shell/camelhead_open/surface.off"}) {
     if (!std::filesystem::exists(*data / name)) continue;
     CAPTURE(name);
