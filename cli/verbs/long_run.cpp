@@ -12,11 +12,15 @@
 
 namespace subvol::cli {
 
-void LongRun::prepare(const std::vector<Part>& parts) {
+void LongRun::check_outputs(const std::vector<Part>& parts) {
   if (run_.outputs.empty() && run_.report.empty())
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
+}
+
+void LongRun::prepare(const std::vector<Part>& parts) {
+  check_outputs(parts);
   add_warnings(unused_output_options(verb_, outputs_));
 }
 

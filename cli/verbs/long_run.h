@@ -25,7 +25,9 @@ class LongRun {
   LongRun(const RunOptions& run, const CLI::App& verb) : run_(run), verb_(verb) {}
 
   /// UsageError if there is nothing to write, and as `checked_outputs`. Sets the number of threads and the memory
-  /// limit, and warns of options that have no effect on the outputs.
+  /// limit.
+  void check_outputs(const std::vector<Part>& parts);
+  /// Does the same, and warns of options that have no effect on the outputs.
   void prepare(const std::vector<Part>& parts);
   /// Prints the warnings that have not been printed yet.
   void tell_warnings();

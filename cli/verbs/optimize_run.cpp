@@ -162,13 +162,14 @@ void OptimizeRun::summarize() const {
 }
 
 int OptimizeRun::run() {
-  prepare({Part::cutaway, Part::boundary, Part::region});
+  check_outputs({Part::cutaway, Part::boundary, Part::region});
   timed("read", &OptimizeRun::load);
   if (curved_ && !arguments_.target.empty()) {
     for (const char* option : {"--sizes", "--max-tolerance"})
       if (verb_.count(option) > 0) throw UsageError(std::string(option) + ": not for curved cells");
     return run_high_order_fit(curving_arguments(arguments_, verb_), verb_);
   }
+  add_warnings(unused_output_options(verb_, outputs_));
   if (curved_) return CurvedOptimizeRun(arguments_, *this, *std::move(curved_)).run();
   timed("optimize", &OptimizeRun::optimize);
   timed("write", &OptimizeRun::write);

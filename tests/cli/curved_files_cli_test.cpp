@@ -167,8 +167,11 @@ TEST_CASE("fit and optimize: curved cells of other programs are the start of a f
   INFO(higher.err);
   CHECK(place.json("higher.json")["orders"]["max"] == 3);
   CHECK(place.json("higher.json")["valid"] == true);
-  const Run again = place.run("optimize curved.msh --target target.off -o again.vtu --report again.json");
+  const Run again = place.run("optimize curved.msh --target target.off -o again.vtu --quantize --report again.json");
   INFO(again.err);
+  const std::size_t warned = again.err.find("--quantize has no effect");
+  CHECK(warned != std::string::npos);
+  CHECK(again.err.find("--quantize has no effect", warned + 1) == std::string::npos);
   const nlohmann::json report = place.json("again.json");
   CHECK(report["command"] == "optimize");
   CHECK(report["orders"]["max"] == 2);
