@@ -10,6 +10,7 @@
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
+#include <CGAL/exceptions.h>
 
 #include <Eigen/Geometry>
 
@@ -44,7 +45,7 @@ class ContactImprint {
 
   /// Finds the clusters. Returns false if there is none, or triangles cross.
   bool find_clusters(const std::function<bool()>& cancelled);
-  /// Replaces their triangles. Returns false if that is not possible.
+  /// Replaces their triangles. Returns false if that is not possible, or there are too many.
   bool replace_clusters();
   /// Cuts triangles at the vertices of clusters that lie on their edges. Returns false if there are too many.
   bool cut_at_vertices();
@@ -62,7 +63,10 @@ class ContactImprint {
   void set_triangles(const std::vector<Piece>& pieces);
   const std::vector<Index>& inside(Index a, Index b);
 
+  static constexpr std::size_t kMostTests = 300'000'000;  ///< of a point beside a triangle or edge: a second
+
   TriangleMesh mesh_;
+  std::size_t num_tests_ = 0;
   std::vector<std::vector<Index>> clusters_;
   std::vector<Index> vertices_;                                ///< of clusters, ascending
   std::map<std::array<Index, 2>, std::vector<Index>> inside_;  ///< vertices inside an edge, from its lower number on
@@ -96,6 +100,8 @@ bool ContactImprint::find_clusters(const std::function<bool()>& cancelled) {
 }
 
 bool ContactImprint::replace(const std::vector<Index>& cluster, std::vector<Piece>& pieces) {
+  num_tests_ += cluster.size() * cluster.size();
+  if (num_tests_ > kMostTests) return false;
   // Without the coordinate along which the plane is steepest, the others are as exact as they were.
   const Vec3 normal = doubled_area_vector(mesh_, mesh_.triangles[cluster[0]]);
   const Vec3 on_plane = mesh_.positions[mesh_.triangles[cluster[0]][0]];
@@ -166,8 +172,12 @@ bool ContactImprint::replace_clusters() {
   std::vector<Piece> pieces;
   for (std::size_t t = 0; t < is_replaced.size(); ++t)
     if (!is_replaced[t]) pieces.push_back({mesh_.triangles[t], static_cast<Index>(t)});
-  for (const std::vector<Index>& cluster : clusters_)
-    if (!replace(cluster, pieces)) return false;
+  try {
+    for (const std::vector<Index>& cluster : clusters_)
+      if (!replace(cluster, pieces)) return false;
+  } catch (const CGAL::Failure_exception&) {  // an assertion inside CGAL
+    return false;
+  }
   set_triangles(pieces);
   std::ranges::sort(vertices_);
   vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
@@ -179,6 +189,7 @@ const std::vector<Index>& ContactImprint::inside(Index a, Index b) {
   constexpr double kOnEdge = 1e-9;  // distance from the edge, share of its length
   const auto [it, is_new] = inside_.try_emplace({std::min(a, b), std::max(a, b)});
   if (!is_new) return it->second;
+  num_tests_ += vertices_.size();
   const Vec3& from = mesh_.positions[it->first[0]];
   const Vec3 along = mesh_.positions[it->first[1]] - from;
   std::vector<std::pair<double, Index>> found;
@@ -195,8 +206,6 @@ const std::vector<Index>& ContactImprint::inside(Index a, Index b) {
 }
 
 bool ContactImprint::cut_at_vertices() {
-  constexpr std::size_t kMostTests = 300'000'000;  // a second
-  if (mesh_.triangles.size() * vertices_.size() > kMostTests) return false;
   std::vector<Piece> whole, left;
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) left.push_back({mesh_.triangles[t], static_cast<Index>(t)});
   const auto is_of_cluster = [&](Index v) { return std::ranges::binary_search(vertices_, v); };
@@ -209,6 +218,7 @@ bool ContactImprint::cut_at_vertices() {
       // An edge on which a vertex of a cluster lies is one of the cluster.
       if (!is_of_cluster(a) || !is_of_cluster(b)) continue;
       std::vector<Index> chain = inside(a, b);
+      if (num_tests_ > kMostTests) return false;
       std::erase(chain, apex);  // of a sliver
       if (chain.empty()) continue;
       if (a > b) std::ranges::reverse(chain);
