@@ -49,7 +49,7 @@ class ContactImprint {
   bool replace_clusters();
   /// Cuts triangles at the vertices of clusters that lie on their edges. Returns false if there are too many.
   bool cut_at_vertices();
-  /// Of triangles with the same corners, leaves the first one.
+  /// Drops all but the first of the triangles that have the same corners.
   void drop_equal();
   TriangleMesh take() { return std::move(mesh_); }
 

@@ -91,7 +91,7 @@ bool meet_at_edges_only(const Corners& a, const Corners& b) {
     for (std::size_t f = 0; f < 3; ++f) {
       const Vec3 &p = a[e], &q = a[(e + 1) % 3], &r = b[f], &s = b[(f + 1) % 3];
       if (CGAL::orientation(point(p), point(q), point(r), point(s)) != CGAL::COPLANAR) continue;
-      // If edges lie in one plane, they may cross at the end of a stretch that both triangles hold, or be all of it.
+      // Two edges in one plane may cross. Their crossing is all that the triangles share, or the end of a stretch.
       const auto triangle = [](const Corners& t) {
         const auto exact = [](const Vec3& x) { return ExactKernel::Point_3(x[0], x[1], x[2]); };
         return ExactKernel::Triangle_3(exact(t[0]), exact(t[1]), exact(t[2]));

@@ -11,8 +11,8 @@
 
 namespace subvol::internal {
 
-/// What runs of Newton's method and of the Levenberg-Marquardt method share: the present state, the trial that a search
-/// has found, and the step to it.
+/// The state that runs of Newton's method and of the Levenberg-Marquardt method have in common: the present values, the
+/// trial that a search has found, and the step to it.
 class MinimizerRun {
  protected:
   MinimizerRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);

@@ -19,7 +19,7 @@ namespace subvol::internal {
 /// next one. Positions that differ only by such coordinates become one vertex, too.
 class PositionWelder {
  public:
-  /// Returns the number of the vertex at a position, for now: see `take`.
+  /// Returns a provisional number of the vertex at a position; `take` replaces it by the final one.
   Index vertex(const Vec3& position) {
     const auto [it, is_new] = vertices_.try_emplace(key(position, 0), static_cast<Index>(positions_.size()));
     if (is_new) positions_.push_back(position);
@@ -27,7 +27,7 @@ class PositionWelder {
   }
 
   /// Returns the position of each vertex, the first one given of those that became one vertex.
-  /// corners  the numbers that `vertex` returned; become the final numbers of the vertices
+  /// corners  the numbers that `vertex` returned; they become the final numbers of the vertices.
   std::vector<Vec3> take(std::vector<Index>& corners) {
     const std::vector<Index> first = first_of_equal();
     std::vector<Index> number(positions_.size());
@@ -54,7 +54,7 @@ class PositionWelder {
     return key;
   }
 
-  /// The first vertex at the place of each vertex, rounding errors of zero left out.
+  /// Returns the first vertex at the place of each vertex; rounding errors of zero do not count.
   std::vector<Index> first_of_equal() {
     double largest = 0;
     for (const Vec3& p : positions_) largest = std::max(largest, p.cwiseAbs().maxCoeff());

@@ -74,7 +74,7 @@ class GltfParser {
     fail("no glTF 2.0 file that can be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
   }
 
-  /// Of the extensions without which a file must not be read, only those that do not concern the shape are ignored.
+  /// Refuses a file that requires an extension, unless the extension does not concern the shape.
   void require_known_extensions() const {
     constexpr std::string_view kAppearance[] = {"_materials_", "_texture_", "_technique", "_lights_", "_xmp"};
     for (const std::string& extension : model_.extensionsRequired) {

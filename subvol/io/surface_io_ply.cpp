@@ -57,7 +57,7 @@ struct PlyElement {
   }
 };
 
-/// What a row of text holds: one element, as the format says, or as many values as fit.
+/// How the rows of a text are divided: a row holds one element, as the format says, or as many values as fit.
 enum class PlyRows { elements, values };
 
 class PlyParser {

@@ -38,6 +38,14 @@ DisjointSets joined_triangles(const SurfaceParts& parts) {
   return sets;
 }
 
+/// Returns the corner of a side's triangle that is not on the edge.
+Index third_corner(const SurfaceParts& parts, std::size_t side) {
+  const SurfaceHalfEdge& edge = parts.sides[side];
+  for (const Index v : parts.surface.mesh.triangles[edge.triangle])
+    if (v != edge.low && v != edge.high) return v;
+  return kNoIndex;
+}
+
 /// Returns the sides of an edge by twos, if each two of them belong to one part that they close there; else nothing.
 /// The two sides of a fold lie on each other, and close nothing.
 std::vector<std::array<std::size_t, 2>> pairs_of_parts(const SurfaceParts& parts, std::size_t first,
@@ -48,6 +56,7 @@ std::vector<std::array<std::size_t, 2>> pairs_of_parts(const SurfaceParts& parts
   std::vector<std::array<std::size_t, 2>> pairs;
   for (const auto& [part, sides] : sides_of) {
     if (sides.size() != 2 || parts.sides[sides[0]].forward == parts.sides[sides[1]].forward) return {};
+    if (third_corner(parts, sides[0]) == third_corner(parts, sides[1])) return {};
     pairs.push_back({sides[0], sides[1]});
   }
   for (const auto& [t, s] : contacts_at_edge(parts.surface.mesh, run))

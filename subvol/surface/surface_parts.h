@@ -15,8 +15,8 @@ struct SurfaceParts {
   std::vector<SurfaceHalfEdge> sides;  ///< of all triangles, as `sorted_half_edges` returns them
   std::vector<std::array<std::size_t, 2>> joined;  ///< positions in `sides`: pairs of sides that connect two triangles
   std::vector<std::size_t> rims;       ///< positions in `sides`: edges of one triangle
-  /// First position in `sides` of the edges of more than two triangles: those at which solids touch, whose sides are
-  /// also in `joined`, and those that connect nothing.
+  /// First position in `sides` of the edges of more than two triangles: those at which solids touch or lie on each
+  /// other, whose sides are also in `joined`, and those that connect nothing.
   std::vector<std::size_t> touching, crowded;
   std::vector<int> part;               ///< of each triangle, numbered by the first triangle
   std::vector<char> is_closed;         ///< of each part: no rim and no crowded edge

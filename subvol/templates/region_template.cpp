@@ -206,7 +206,7 @@ RegionSearch::Faults RegionSearch::faults_of(const VoxelLabels& labels, const Re
       faults.wrong_sheets += at->second != sheet;
     }
   }
-  // What separates two regions that must not touch is too thin.
+  // A layer that separates two regions is thinner than a cell, so that they touch although they must not.
   for (const auto& [pair, sheet] : found->sheets)
     if (!wanted_.sheets.contains(pair))
       for (std::size_t r = 0; r < faults.is_wrong.size(); ++r) {

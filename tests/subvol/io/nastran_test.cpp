@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What Nastran's files of other programs have: includes, coordinate systems, repeated cards, cells numbered either way.
+// Nastran files of other programs have includes, coordinate systems, repeated cards and cells numbered either way.
 #include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
