@@ -6,7 +6,7 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { show } from "../tests/browser/browser.mjs";
+import { browser, show } from "../tests/browser/browser.mjs";
 
 const SCALE = 2; // pixels per unit of length: lines and letters stay readable where a page shows pictures smaller
 const half = (axis, position = 0.5, more = {}) => ({ cut: { on: true, axis, position, ...more } });
@@ -117,6 +117,18 @@ const PICTURES = {
   },
 };
 
+/// name -> {commands, size, page: a file that they write}. The page is drawn as a reader sees it who prefers dark colors.
+const DARK_PAGES = {
+  report_dark: {
+    commands: [
+      ["fit", "rod.obj", "-o", "rod.mesh", "--report", "rod.json"],
+      ["report", "rod.json", "--no-viewer", "-o", "rod.html"],
+    ],
+    size: [1000, 1165],
+    page: "rod.html",
+  },
+};
+
 const [build, out, ...wanted] = process.argv.slice(2);
 if (!build || !out) {
   console.error("usage: pictures.mjs BUILD_FOLDER OUT_FOLDER [NAME ...]");
@@ -126,6 +138,15 @@ const subvol = resolve(build, "subvol"), folder = mkdtempSync(join(tmpdir(), "su
 execFileSync(resolve(build, "subvol_samples"), [folder]);
 const run = (words) => execFileSync(subvol, words, { cwd: folder, stdio: ["ignore", "ignore", "inherit"] });
 const done = new Set();
+const is_wanted = (name) => wanted.length === 0 || wanted.includes(name);
+/// Runs commands that have not run yet.
+function run_new(commands) {
+  for (const words of commands) {
+    const key = words.join(" ");
+    if (!done.has(key)) run([...words, "--force", ...(words[0] === "report" ? [] : ["--quiet"])]);
+    done.add(key);
+  }
+}
 mkdirSync(out, { recursive: true });
 
 /// A page that opens the pages of the panels one after another and sends their pictures.
@@ -162,12 +183,8 @@ run().catch((error) => "error: " + error.stack).then((answer) =>
 </script></body>`;
 
 for (const [name, picture] of Object.entries(PICTURES)) {
-  if ((wanted.length > 0 && !wanted.includes(name))) continue;
-  for (const words of picture.commands) {
-    const key = words.join(" ");
-    if (!done.has(key)) run([...words, "--force", "--quiet"]);
-    done.add(key);
-  }
+  if (!is_wanted(name)) continue;
+  run_new(picture.commands);
   const files = { "/": harness(picture) };
   picture.panels.forEach(({ view }, i) => {
     run(["view", ...view, "-o", `${i}.html`, "--force"]);
@@ -176,6 +193,14 @@ for (const [name, picture] of Object.entries(PICTURES)) {
   const { answer } = await show("/", files, [`--force-device-scale-factor=${SCALE}`, "--window-size=1600,1000"]);
   if (!answer.startsWith("data:image/png")) throw new Error(`${name}: ${answer}`);
   writeFileSync(join(out, `${name}.png`), Buffer.from(answer.split(",")[1], "base64"));
+  console.log(`${name}.png`);
+}
+for (const [name, { commands, size, page }] of Object.entries(DARK_PAGES)) {
+  if (!is_wanted(name)) continue;
+  run_new(commands);
+  execFileSync(browser(), ["--headless", "--no-sandbox", "--hide-scrollbars", "--blink-settings=preferredColorScheme=0",
+    `--window-size=${size.join(",")}`, `--screenshot=${resolve(out, name)}.png`, `file://${join(folder, page)}`],
+    { stdio: "ignore" });
   console.log(`${name}.png`);
 }
 rmSync(folder, { recursive: true });

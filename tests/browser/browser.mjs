@@ -21,7 +21,7 @@ export function fail(why) {
 }
 
 /// The first of the browsers that is there.
-function browser() {
+export function browser() {
   for (const name of [process.env.SUBVOL_CHROMIUM, "chromium", "chromium-browser", "google-chrome"])
     if (name && spawnSync(name, ["--version"]).status === 0) return name;
   skip("no Chromium; apt-get install chromium");
