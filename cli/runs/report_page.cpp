@@ -43,8 +43,9 @@ std::string heading(const Json& report) {
   const std::string title = "subvol " + report.value("command", std::string()) + ": " + input_name(report);
   std::string text = "<h1>" + escaped(title) + "</h1>\n<p>";
   if (report.contains("valid"))
-    text += report["valid"].get<bool>() ? "<span class=\"verdict good\">Valid.</span> "
-                                        : "<span class=\"verdict bad\">Not valid.</span> ";
+    text += std::string(report["valid"].get<bool>() ? "<span class=\"verdict good\">Valid"
+                                                    : "<span class=\"verdict bad\">Not valid") +
+            (report.contains("stop_reason") ? ",</span> " : ".</span> ");
   if (report.contains("stop_reason"))
     text += "<span class=\"verdict " + std::string(report.value("converged", false) ? "good" : "bad") + "\">" +
             words(report["stop_reason"]) + "</span>: " + escaped(report.value("explanation", std::string())) + ".";
