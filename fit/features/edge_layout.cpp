@@ -1,23 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/edge_layout.h"
 #include "subvol/fit/features/joined_curves.h"
+#include "subvol/fit/features/narrow_strips.h"
+#include "subvol/fit/features/routing_graph.h"
 
 #include "subvol/mesh/mesh_topology.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace subvol::internal {
 
-EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
-                       const SignedFeatures& features, const RoutingOptions& options) {
-  VolumeMesh near_target = grid;
-  near_target.positions.assign(fitted.begin(), fitted.end());
+namespace {
+
+/// h near each curve that no path follows as a whole; 0 for the others.
+std::vector<double> lengths_near_lost(const VolumeMesh& near_target, const SignedFeatures& features,
+                                      const FeatureRouting& routing, const RoutingOptions& options) {
+  std::vector<double> lengths(features.curves.curves.size(), 0.0);
+  if (routing.unfollowed.empty()) return lengths;
+  const RoutingGraph graph(near_target, false, options.sizes);
+  for (const UnfollowedCurve& lost : routing.unfollowed)
+    lengths[lost.curve] = edge_lengths_near(graph, features.curves.curves[lost.curve]).mean;
+  return lengths;
+}
+
+/// near_target  the grid at its fitted positions.
+EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, const TriangleMesh& target,
+                     const SignedFeatures& features, FeatureRouting routing, std::span<const double> lengths) {
   EdgeLayout layout;
-  layout.routing = route_features(near_target, features, options);
+  layout.routing = std::move(routing);
   layout.patched = patched_mesh(grid, near_target.positions, layout.routing, target);
-  const PatchGroups groups =
+  PatchGroups groups =
       patch_groups(MeshTopology(grid), layout.patched.patches, near_target.positions, target, features);
   layout.pads = add_pads(layout.patched, features);
+  follow_narrow_strips(layout.patched, layout.routing, groups, target, features, lengths);
   layout.caps = quality_caps(layout.patched, features);
   layout.tagged_mesh = layout.patched.mesh;
   const std::vector<CreasePath> paths = paths_of_parts(layout.patched.paths, features.curves.curves.size());
@@ -32,6 +48,27 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
     layout.group_of_face[boundary[i]] = groups.of_patch[layout.patched.patches.of_face[i]];
   for (const Index region : features.regions) layout.group_of_triangle.push_back(groups.of_region[region]);
   return layout;
+}
+
+}  // namespace
+
+EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
+                       const SignedFeatures& features, const RoutingOptions& options) {
+  VolumeMesh near_target = grid;
+  near_target.positions.assign(fitted.begin(), fitted.end());
+  const FeatureRouting routing = route_features(near_target, features, options);
+  const std::vector<double> lengths = lengths_near_lost(near_target, features, routing, options);
+  std::vector<Index> beside = strips_in_parts(routing, target, features, lengths);
+  while (true) {
+    EdgeLayout layout =
+        layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), lengths);
+    // Those that no strip follows get their parts back.
+    const auto is_lost = [&](Index c) {
+      return std::ranges::find(layout.routing.unfollowed, c, &UnfollowedCurve::curve) !=
+             layout.routing.unfollowed.end();
+    };
+    if (std::erase_if(beside, is_lost) == 0) return layout;
+  }
 }
 
 }  // namespace subvol::internal

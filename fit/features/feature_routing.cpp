@@ -465,6 +465,25 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
   return best->result();
 }
 
+FeatureRouting without_parts(FeatureRouting routing, std::span<const Index> curves, const FeatureCurves& all) {
+  const auto is_named = [&](Index c) { return std::ranges::find(curves, c) != curves.end(); };
+  std::erase_if(routing.paths, [&](const CreasePath& path) { return is_named(path.curve); });
+  std::erase_if(routing.parts, [&](const FollowedPart& part) { return is_named(part.curve); });
+  std::erase_if(routing.corners, [&](const PlacedCorner& corner) {
+    return std::ranges::none_of(routing.paths, [&](const CreasePath& path) {
+      return path.vertices.front() == corner.vertex || path.vertices.back() == corner.vertex;
+    });
+  });
+  for (UnfollowedCurve& lost : routing.unfollowed) {
+    if (!is_named(lost.curve)) continue;
+    lost.points = all.curves[lost.curve].points;
+    const ArcLength arc(lost.points);
+    lost.length = arc.length();
+    lost.place = arc.at(arc.length() / 2);
+  }
+  return routing;
+}
+
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
   double all = 0, routed = 0;
   for (const FeatureCurve& curve : curves.curves) all += curve.length();

@@ -99,6 +99,9 @@ struct FeatureRouting {
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
                               const RoutingOptions& options = {});
 
+/// Returns a routing without the paths of some curves that are followed in parts; they are lost as a whole then.
+FeatureRouting without_parts(FeatureRouting routing, std::span<const Index> curves, const FeatureCurves& all);
+
 /// Returns the share of the curves' length that paths follow; 1 without curves.
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves);
 

@@ -140,4 +140,12 @@ struct PadReport {
 /// together, and the edges between them keep their numbers of cells.
 PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features);
 
+/// Puts one pad under some patches and those without which it cannot be made: those of their sets, and neighbors as
+/// `add_pads` adds them.
+///
+/// never    patches that the pad may not lie under.
+/// returns  false if there is no such pad; the mesh is unchanged then. InputError: as `pad`.
+bool pad_beside(PatchedMesh& patched, const SignedFeatures& features, std::span<const Index> patches,
+                std::span<const Index> never);
+
 }  // namespace subvol::internal

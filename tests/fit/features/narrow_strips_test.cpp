@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/features/narrow_strips.h"
+#include "subvol/fit/features/quality_caps.h"
+#include "subvol/mesh/validate.h"
+#include "tests/support/feature_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+using namespace subvol;
+using namespace subvol::internal;
+using namespace subvol::test;
+
+namespace {
+
+constexpr double kChamfer = 0.15;
+
+/// The cube [-1, 1]^3 with a chamfer along the edges of its top.
+TriangleMesh chamfered_cube() {
+  TriangleMesh mesh;
+  const double x[] = {-1, 1, 1, -1}, y[] = {-1, -1, 1, 1};
+  for (const auto& [z, size] : {std::pair(-1.0, 1.0), std::pair(1 - kChamfer, 1.0), std::pair(1.0, 1 - kChamfer)})
+    for (int i = 0; i < 4; ++i) mesh.positions.emplace_back(size * x[i], size * y[i], z);
+  const auto add_quad = [&](Index a, Index b, Index c, Index d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  add_quad(3, 2, 1, 0);
+  add_quad(8, 9, 10, 11);
+  for (Index ring : {0, 4})
+    for (Index i = 0; i < 4; ++i) add_quad(ring + i, ring + (i + 1) % 4, ring + 4 + (i + 1) % 4, ring + 4 + i);
+  return mesh;
+}
+
+enum class Height { below, at_chamfer, at_top, between };
+
+Height height_of(const FeatureCurve& curve) {
+  const double a = curve.points.front().z(), b = curve.points.back().z();
+  if (a == 1 && b == 1) return Height::at_top;
+  if (a == 1 - kChamfer && b == 1 - kChamfer) return Height::at_chamfer;
+  return a == 1 || b == 1 ? Height::between : Height::below;
+}
+
+Index vertex_at(const VolumeMesh& mesh, const Vec3& place) {
+  const auto at = std::ranges::find_if(mesh.positions, [&](const Vec3& p) { return (p - place).norm() < 1e-9; });
+  REQUIRE(at != mesh.positions.end());
+  return static_cast<Index>(at - mesh.positions.begin());
+}
+
+/// Paths along all edges of a cube of cells, except that those of one height are lost, and those between both.
+FeatureRouting cube_routing(const VolumeMesh& cube, const SignedFeatures& features, Height lost) {
+  const auto corner_near = [](const Vec3& p) {
+    return Vec3(p.x() < 0 ? -1 : 1, p.y() < 0 ? -1 : 1, p.z() < 0 ? -1 : 1);
+  };
+  FeatureRouting routing;
+  for (std::size_t c = 0; c < features.curves.curves.size(); ++c) {
+    const FeatureCurve& curve = features.curves.curves[c];
+    const Height height = height_of(curve);
+    if (height == lost || height == Height::between) {
+      const auto reason = height == lost ? NotFollowed::lost_to_neighbor : NotFollowed::shorter_than_cell;
+      routing.unfollowed.push_back({static_cast<Index>(c), reason, curve.points[0], curve.points, curve.length()});
+      continue;
+    }
+    const Vec3 from = corner_near(curve.points.front()), to = corner_near(curve.points.back());
+    CreasePath path{static_cast<Index>(c), {}};
+    for (int i = 0; i <= 4; ++i) path.vertices.push_back(vertex_at(cube, from + 0.25 * i * (to - from)));
+    routing.corners.push_back({curve.vertices.front(), path.vertices.front()});
+    routing.corners.push_back({curve.vertices.back(), path.vertices.back()});
+    routing.paths.push_back(std::move(path));
+  }
+  std::ranges::sort(routing.corners, {}, [](const PlacedCorner& p) { return std::pair(p.vertex, p.corner); });
+  routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
+  return routing;
+}
+
+}  // namespace
+
+TEST_CASE("narrow strips: a chamfer narrower than a cell gets a row of faces of its own, whichever edge was found") {
+  const Height lost = GENERATE(Height::at_top, Height::at_chamfer);
+  const TriangleMesh target = chamfered_cube();
+  const SignedFeatures features = features_of(target);
+  REQUIRE(features.curves.curves.size() == 20);
+  const VolumeMesh cube = centered_lattice(4);
+  FeatureRouting routing = cube_routing(cube, features, lost);
+  PatchedMesh patched = patched_mesh(cube, cube.positions, routing, target);
+  PatchGroups groups = patch_groups(MeshTopology(cube), patched.patches, cube.positions, target, features);
+  add_pads(patched, features);
+  const std::size_t patches = patched.patches.count;
+  const std::vector<double> lengths(features.curves.curves.size(), 0.5);
+
+  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths) == 4);
+  CHECK(routing.unfollowed.empty());
+  CHECK(validate(patched.mesh).empty());
+  CHECK(patched.patches.count == patches + 4);
+  REQUIRE(groups.of_patch.size() == patched.patches.count);
+
+  SECTION("every curve has a path between the vertices of its corners, and no edge has two") {
+    const MeshTopology topology(patched.mesh);
+    std::set<Index> edges;
+    std::size_t num_edges = 0;
+    REQUIRE(patched.paths.size() == features.curves.curves.size());
+    for (const CreasePath& path : patched.paths) {
+      for (const Index edge : edges_of_path(topology, path.vertices)) edges.insert(edge), ++num_edges;
+      const FeatureCurve& curve = features.curves.curves[path.curve];
+      for (const auto& [corner, vertex] : {std::pair(curve.vertices.front(), path.vertices.front()),
+                                           std::pair(curve.vertices.back(), path.vertices.back())})
+        CHECK(std::ranges::find(patched.corners, PlacedCorner{corner, vertex}) != patched.corners.end());
+    }
+    CHECK(edges.size() == num_edges);
+  }
+  SECTION("paths divide the boundary into the patches, one for each region of the target") {
+    const MeshTopology topology(patched.mesh);
+    const BoundaryPatches found = boundary_patches(topology, patched.paths);
+    CHECK(found.count == features.num_regions);
+    for (std::size_t f = 0; f < found.of_face.size(); ++f)
+      for (std::size_t g = 0; g < f; ++g)
+        if ((found.of_face[f] == found.of_face[g]) != (patched.patches.of_face[f] == patched.patches.of_face[g]))
+          FAIL("faces " << f << " and " << g);
+    std::set<Index> used(patched.patches.of_face.begin(), patched.patches.of_face.end());
+    std::set<Index> of_regions(groups.of_region.begin(), groups.of_region.end()), of_patches;
+    for (const Index p : used) of_patches.insert(groups.of_patch[p]);
+    CHECK(of_regions.size() == features.num_regions);
+    CHECK(of_patches == of_regions);
+  }
+  SECTION("the edges of the chamfer can have good cells") {
+    for (const EdgeCap& cap : quality_caps(patched, features).edges) CHECK(cap.cap > 0.6);
+  }
+}
+
+TEST_CASE("narrow strips: curves farther apart than a cell, and those that were excluded, are left alone") {
+  const TriangleMesh target = chamfered_cube();
+  const SignedFeatures features = features_of(target);
+  const VolumeMesh cube = centered_lattice(4);
+  FeatureRouting routing = cube_routing(cube, features, Height::at_top);
+  double length = 0.5;
+  SECTION("cells much smaller than the chamfer") { length = 0.2 * kChamfer; }
+  SECTION("excluded") {
+    for (UnfollowedCurve& lost : routing.unfollowed) lost.reason = NotFollowed::excluded;
+  }
+  PatchedMesh patched = patched_mesh(cube, cube.positions, routing, target);
+  PatchGroups groups = patch_groups(MeshTopology(cube), patched.patches, cube.positions, target, features);
+  const std::size_t cells = patched.mesh.num_cells(), unfollowed = routing.unfollowed.size();
+  const std::vector<double> lengths(features.curves.curves.size(), length);
+  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths) == 0);
+  CHECK(patched.mesh.num_cells() == cells);
+  CHECK(routing.unfollowed.size() == unfollowed);
+}
