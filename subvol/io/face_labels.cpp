@@ -10,9 +10,9 @@ void FaceLabels::List::add(const std::string& name) {
   // The faces of an object come one after the other.
   if (!of_face.empty() && of_face.back() >= 0 && names[static_cast<std::size_t>(of_face.back())] == name)
     return of_face.push_back(of_face.back());
-  const auto place = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
-  if (place == names.size()) names.push_back(name);
-  of_face.push_back(static_cast<int>(place));
+  const auto [known, is_new] = places.try_emplace(name, static_cast<int>(names.size()));
+  if (is_new) names.push_back(name);
+  of_face.push_back(known->second);
 }
 
 bool FaceLabels::List::tells_apart() const {

@@ -5,6 +5,7 @@
 #include "subvol/mesh/face_groups.h"
 
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 namespace subvol::internal {
@@ -21,6 +22,7 @@ class FaceLabels {
  private:
   struct List {
     std::vector<std::string> names;
+    std::unordered_map<std::string, int> places;  ///< of the names
     std::vector<int> of_face;  ///< a place in `names`; -1: none
     void add(const std::string& name);
     bool tells_apart() const;

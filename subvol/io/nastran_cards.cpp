@@ -9,6 +9,8 @@ namespace subvol::internal {
 
 namespace {
 
+constexpr std::size_t kLongestPath = 4096;  ///< of an included file, in bytes
+
 /// Replaces tabs by blanks up to the next column of eight.
 std::string without_tabs(std::string_view line) {
   std::string result;
@@ -84,6 +86,15 @@ std::string added(const std::string& field, const std::string& step) {
   return sum;
 }
 
+/// Throws InputError if a card is longer than any that a program repeats: each repetition would copy all of it.
+void require_short(const NastranCard& card) {
+  constexpr std::size_t kMostFields = 65, kMostCharacters = 2000;
+  std::size_t characters = 0;
+  for (const std::string& field : card.fields) characters += field.size();
+  if (card.fields.size() > kMostFields || characters > kMostCharacters)
+    card.fail("a card of more than 8 lines is repeated");
+}
+
 }  // namespace
 
 std::optional<double> nastran_number(std::string_view field) {
@@ -133,7 +144,8 @@ void NastranCards::read_file_of(const std::string& file, std::string_view bytes,
         input->erase(0, 1);
         while (input->find(quote) == std::string::npos) {  // a long path goes on in the next line
           const auto more = lines.line();
-          if (!more) fail_at(place, "INCLUDE: expected a quote behind the name of the file");
+          if (!more || input->size() > kLongestPath)
+            fail_at(place, "INCLUDE: expected a quote behind the name of the file");
           *input += trimmed(*more);
         }
         input->erase(input->find(quote));
@@ -197,6 +209,7 @@ void NastranCards::end_card() {
 /// adds x.
 void NastranCards::repeat_with_changes() {
   if (last_.fields.empty()) card_.fail("'=' repeats a card, but there is none before it");
+  require_short(last_);
   NastranCard next{{last_.name()}, card_.place, {}};
   steps_.assign(1, "");
   for (std::size_t i = 1; i < std::max(card_.fields.size(), last_.fields.size()); ++i) {
@@ -217,6 +230,7 @@ void NastranCards::repeat_with_changes() {
 void NastranCards::repeat(std::int64_t times) {
   constexpr std::int64_t kMostRepeated = 1 << 20;  // a short line stands for many cards
   if (steps_.empty()) return;
+  require_short(last_);
   if (times > kMostRepeated - num_repeated_)
     card_.fail("more than " + std::to_string(kMostRepeated) + " repeated cards");
   for (; times > 0; --times, ++num_repeated_) {

@@ -189,6 +189,7 @@ class ExodusParser {
     long long id;
     std::optional<CellKind> kind;        ///< none: elements that are no cells
     std::size_t num_elements, first_cell;
+    long long first_element = 1;  ///< its number: elements are numbered from 1 through all blocks
   };
 
   std::size_t count_of(const std::string& dimension) const {
@@ -236,11 +237,13 @@ class ExodusParser {
     const std::size_t n = count_of("num_el_blk");
     const std::vector<long long> numbers = ids("eb_prop1", file_.size_of("eb_prop1", n, 1));
     const std::vector<std::string> names = file_.names("eb_names", n);
+    long long first_element = 1;
     for (std::size_t b = 0; b < n; ++b) {
       const std::string number = std::to_string(b + 1), connect = "connect" + number;
       const std::size_t size = count_of("num_el_in_blk" + number);
       const std::string type = upper_case(file_.attribute(connect, "elem_type"));
-      Block block{names[b], numbers[b], std::nullopt, size, mesh_.num_cells()};
+      Block block{names[b], numbers[b], std::nullopt, size, mesh_.num_cells(), first_element};
+      first_element += static_cast<long long>(size);
       if (size > 0) read_block(block, connect, type, count_of("num_nod_per_el" + number));
       blocks_.push_back(std::move(block));
     }
@@ -333,11 +336,12 @@ class ExodusParser {
     side_names_ = file_.names("ss_names", n);
     const auto faces = faces_by_kind(exodus_faces);
     GroupList groups;
-    std::vector<Index> corners;
+    std::vector<Index> corners, group_of_set;
     for (std::size_t s = 0; s < n; ++s) {
       const std::string number = std::to_string(s + 1);
       const std::size_t size = count_of("num_side_ss" + number);
       const Index group = groups.by_number(number_of(numbers[s], "ss_prop1"));
+      group_of_set.push_back(group);
       if (size == 0) continue;
       const std::vector<long long> elements = file_.integers("elem_ss" + number, size),
                                    sides = file_.integers("side_ss" + number, size);
@@ -358,20 +362,19 @@ class ExodusParser {
     }
     mesh_.face_groups.groups = groups.take();
     for (std::size_t s = 0; s < n; ++s)
-      for (Group& group : mesh_.face_groups.groups)
-        if (group.number == numbers[s] && group.name.empty()) group.name = side_names_[s];
+      if (Group& group = mesh_.face_groups.groups[static_cast<std::size_t>(group_of_set[s])]; group.name.empty())
+        group.name = side_names_[s];
   }
 
-  /// Elements are numbered from 1 through all blocks.
+  /// The cell of an element; nothing if its block has none.
   std::optional<std::size_t> cell_of(long long element, const std::string& where) const {
-    long long first = 1;
-    for (const Block& block : blocks_) {
-      const auto size = static_cast<long long>(block.num_elements);
-      if (element >= first && element < first + size)
-        return block.kind ? std::optional(block.first_cell + static_cast<std::size_t>(element - first)) : std::nullopt;
-      first += size;
-    }
-    file_.fail(where + ": there is no element " + std::to_string(element));
+    const auto behind = std::ranges::upper_bound(blocks_, element, {}, &Block::first_element);
+    if (behind == blocks_.begin() ||
+        element - behind[-1].first_element >= static_cast<long long>(behind[-1].num_elements))
+      file_.fail(where + ": there is no element " + std::to_string(element));
+    const Block& block = behind[-1];
+    if (!block.kind) return std::nullopt;
+    return block.first_cell + static_cast<std::size_t>(element - block.first_element);
   }
 
   /// Node sets that hold all corners of some faces of the boundary become groups of these faces. Sets of the nodes of
@@ -381,28 +384,57 @@ class ExodusParser {
     const std::size_t n = count_of("num_node_sets");
     const std::vector<std::string> names = file_.names("ns_names", n);
     const std::vector<long long> numbers = ids("ns_prop1", file_.size_of("ns_prop1", n, 1));
+    const std::set<std::string> side_names(side_names_.begin(), side_names_.end());
+    list_groups();
+    long long next_free = 1;
     std::optional<BoundaryOfNodes> boundary;
     for (std::size_t s = 0; s < n; ++s) {
-      const bool is_known = names[s].empty() ? holds_corners_of_group(s, numbers[s])
-                                             : std::ranges::find(side_names_, names[s]) != side_names_.end();
+      const bool is_known = names[s].empty() ? holds_corners_of_group(s, numbers[s]) : side_names.contains(names[s]);
       if (is_known) continue;
       if (!boundary) boundary.emplace(mesh_);
       const auto faces = boundary->faces_of(nodes_of_set(s));
       auto& groups = mesh_.face_groups.groups;
       const auto is_free = [&](long long number) {
         return number > 0 && number <= std::numeric_limits<int>::max() &&
-               std::ranges::none_of(groups, [&](const Group& other) { return other.number == number; });
+               !group_of_number_.contains(static_cast<int>(number));
       };
       long long number = numbers[s];
-      if (!names[s].empty() && !is_free(number))
-        for (number = 1; !is_free(number);) ++number;
+      if (!names[s].empty() && !is_free(number)) {
+        while (!is_free(next_free)) ++next_free;
+        number = next_free;
+      }
       if (faces.empty() || !is_free(number)) {
         left_out_.add(faces.empty() ? "node sets of no faces, or of all" : "node sets with the number of a side set");
         continue;
       }
+      const auto group = static_cast<Index>(groups.size());
       groups.push_back({names[s], static_cast<int>(number), 2});
-      for (const auto face : faces) add_face(mesh_, face, static_cast<Index>(groups.size() - 1));
+      group_of_number_.emplace(static_cast<int>(number), group);
+      corners_of_group_.emplace_back();
+      for (const auto face : faces) {
+        add_face(mesh_, face, group);
+        corners_of_group_.back().insert(corners_of_group_.back().end(), face.begin(), face.end());
+      }
+      sort_out(corners_of_group_.back());
     }
+  }
+
+  /// Notes the numbers and the corners of the groups so far.
+  void list_groups() {
+    const VolumeFaceGroups& all = mesh_.face_groups;
+    for (std::size_t g = 0; g < all.groups.size(); ++g)
+      group_of_number_.emplace(all.groups[g].number, static_cast<Index>(g));
+    corners_of_group_.resize(all.groups.size());
+    for (const GroupedFace& entry : all.faces)
+      for (const Index v : entry.face)
+        if (v != kNoIndex) corners_of_group_[static_cast<std::size_t>(entry.group)].push_back(v);
+    for (std::vector<Index>& corners : corners_of_group_) sort_out(corners);
+  }
+
+  /// Puts nodes in ascending order, each once.
+  static void sort_out(std::vector<Index>& nodes) {
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   }
 
   /// The nodes of a set, each once and ascending.
@@ -413,31 +445,25 @@ class ExodusParser {
     if (size == 0) return nodes;
     for (const long long node : file_.integers("node_ns" + suffix, size))
       if (node >= 1 && node <= static_cast<long long>(num_nodes_)) nodes.push_back(static_cast<Index>(node - 1));
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    sort_out(nodes);
     return nodes;
   }
 
   bool holds_corners_of_group(std::size_t set, long long number) {
-    const auto& groups = mesh_.face_groups.groups;
-    const auto group =
-        std::ranges::find_if(groups, [&](const Group& other) { return other.number == number && other.name.empty(); });
-    if (group == groups.end()) return false;
-    const auto place = static_cast<Index>(group - groups.begin());
-    std::set<Index> wanted, found;
-    for (const GroupedFace& entry : mesh_.face_groups.faces)
-      if (entry.group == place)
-        for (const Index v : entry.face)
-          if (v != kNoIndex) wanted.insert(v);
+    if (number <= 0 || number > std::numeric_limits<int>::max()) return false;
+    const auto group = group_of_number_.find(static_cast<int>(number));
+    if (group == group_of_number_.end()) return false;
+    const auto place = static_cast<std::size_t>(group->second);
+    if (!mesh_.face_groups.groups[place].name.empty()) return false;
     if (is_corner_.empty()) {
       is_corner_.assign(mesh_.positions.size(), false);
       for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
         for (const Index v : mesh_.cell(c).first(num_corners(mesh_.kinds[c])))
           is_corner_[static_cast<std::size_t>(v)] = true;
     }
-    for (const Index node : nodes_of_set(set))
-      if (is_corner_[static_cast<std::size_t>(node)]) found.insert(node);
-    return found == wanted;
+    std::vector<Index> found = nodes_of_set(set);
+    std::erase_if(found, [&](Index node) { return !is_corner_[static_cast<std::size_t>(node)]; });
+    return found == corners_of_group_[place];
   }
 
   ExodusFile file_;
@@ -446,6 +472,8 @@ class ExodusParser {
   LeftOut left_out_;
   std::vector<Block> blocks_;
   std::vector<std::string> side_names_;
+  std::map<int, Index> group_of_number_;               ///< places of the groups; see list_groups
+  std::vector<std::vector<Index> > corners_of_group_;  ///< ascending
   std::vector<bool> is_corner_;  ///< of the nodes: one of a cell's corners; empty until it is asked for
   std::size_t num_nodes_ = 0;
 };

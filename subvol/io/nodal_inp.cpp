@@ -93,6 +93,7 @@ class InpParser {
     FilePlace place;
   };
   static constexpr std::size_t kNone = InpSets::kNone;
+  static constexpr std::size_t kMostFaces = 1u << 26;  ///< in groups: sets of sets could double with every line
 
   [[noreturn]] void fail(const std::string& what) const { fail_at(place_, what); }
 
@@ -395,7 +396,6 @@ class InpParser {
       if (!element_sets_.is_defined(side.set))
         fail("*SURFACE: there is no element set " + in_quotes(element_sets_.name(side.set)));
       for (const Index element : element_sets_.members(side.set)) add_side(side, element);
-      constexpr std::size_t kMostFaces = 1u << 26;
       if (mesh_.face_groups.faces.size() > kMostFaces) fail("*SURFACE: too many faces");
     }
   }
@@ -416,9 +416,10 @@ class InpParser {
   /// Makes groups of the faces of the boundary all of whose corners are in a set of nodes. No groups are made of sets
   /// without such a face or with all of them, or that have the name of a surface.
   void add_node_sets() {
+    const std::set<std::string> surfaces = names_of_surfaces();
     std::vector<std::size_t> wanted;
     for (std::size_t s = 0; s < node_sets_.size(); ++s)
-      if (node_sets_.is_defined(s) && !has_group(node_sets_.name(s))) wanted.push_back(s);
+      if (node_sets_.is_defined(s) && !surfaces.contains(upper_case(node_sets_.name(s)))) wanted.push_back(s);
     if (wanted.empty()) return;
     BoundaryOfNodes boundary(mesh_);
     for (const std::size_t s : wanted) {
@@ -429,17 +430,17 @@ class InpParser {
       }
       const Index group = faces_.by_name(node_sets_.name(s));
       for (const std::span<const Index> face : faces) add_face(mesh_, face, group);
+      if (mesh_.face_groups.faces.size() > kMostFaces) fail("*NSET: too many faces");
     }
   }
 
-  bool has_group(const std::string& name) const {
-    const auto is_name = [&](const std::string& other) { return upper_case(other) == upper_case(name); };
-    return std::ranges::any_of(faces_.groups(),
-                               [&](const Group& group) {
-                                 return is_name(group.name) ||
-                                        (group.name.empty() && is_name("GROUP_" + std::to_string(group.number)));
-                               }) ||
-           std::ranges::any_of(plain_names_, [&](const auto& plain) { return is_name(plain.second); });
+  /// The names of the surfaces, in upper case.
+  std::set<std::string> names_of_surfaces() const {
+    std::set<std::string> names;
+    for (const Group& group : faces_.groups())
+      names.insert(group.name.empty() ? "GROUP_" + std::to_string(group.number) : upper_case(group.name));
+    for (const auto& [group, name] : plain_names_) names.insert(upper_case(name));
+    return names;
   }
 
   void add_side(const Side& side, std::size_t element) {
@@ -475,6 +476,9 @@ class InpParser {
     const std::vector<std::size_t> sets = material_sets();
     const std::set<std::size_t> materials(sets.begin(), sets.end());
     std::set<std::size_t> used = materials;
+    std::map<std::size_t, std::vector<std::size_t>> sets_of_one;  // that hold nothing but the set
+    for (std::size_t s = 0; s < element_sets_.size(); ++s)
+      if (const std::size_t other = element_sets_.only_other(s); other != kNone) sets_of_one[other].push_back(s);
     mesh_.references.assign(elements_.size(), 0);
     int next = 1;
     for (const std::size_t s : materials) {
@@ -485,7 +489,8 @@ class InpParser {
       for (const Index element : members) mesh_.references[element] = reference;
       if (!own)
         mesh_.regions.push_back({element_sets_.name(s), reference, 3});
-      else name_region(reference, s, used);
+      else
+        name_region(reference, sets_of_one[s], used);
     }
     if (const std::size_t all = set_of_all_elements(); all != kNone) used.insert(all);  // it says nothing
     std::size_t defined = 0;
@@ -501,9 +506,9 @@ class InpParser {
   }
 
   /// A set that holds nothing but the set of one of our references has its name.
-  void name_region(int reference, std::size_t own, std::set<std::size_t>& used) {
-    for (std::size_t s = 0; s < element_sets_.size(); ++s) {
-      if (used.contains(s) || element_sets_.only_other(s) != own) continue;
+  void name_region(int reference, const std::vector<std::size_t>& sets_of_one, std::set<std::size_t>& used) {
+    for (const std::size_t s : sets_of_one) {
+      if (used.contains(s)) continue;
       mesh_.regions.push_back({element_sets_.name(s), reference, 3});
       used.insert(s);
       return;

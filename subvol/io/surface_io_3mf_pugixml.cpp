@@ -104,6 +104,7 @@ class ThreeMfParser {
     ModelPart& part = found->second;
     if (!is_new) return part;
     load(part, path);
+    num_bytes_ += part.text.size();
     const pugi::xml_node model = part.document.document_element();
     if (local_name(model) != "model")
       part.fail(name_, "expected the element model, found " + in_quotes(local_name(model)));
@@ -180,12 +181,11 @@ class ThreeMfParser {
   void add_object(const ModelPart& part, const std::string& id, const Transform& transform, const std::string& group,
                   int depth) {
     constexpr int kMostDepth = 16;
-    constexpr std::size_t kMostParts = 1 << 20;  // components of components could double with every level
     const auto found = part.objects.find(id);
     if (found == part.objects.end()) part.fail(name_, "there is no object " + in_quotes(id));
-    if (depth > kMostDepth || ++num_parts_ > kMostParts)
-      part.fail(name_, "components include themselves, or are far too many");
+    if (depth > kMostDepth) part.fail(name_, "components include themselves");
     const pugi::xml_node object = found->second;
+    count_visited(num_children(object), part);
     const std::string_view type = object.attribute("type").as_string("model");
     if (type == "support" || type == "solidsupport" || type == "other")
       return left_out_.add("objects of type " + std::string(type));
@@ -206,6 +206,14 @@ class ThreeMfParser {
       num_sliced_ += local_name(attribute) == "slicestackid";
   }
 
+  /// Counts elements that are visited. Each takes some bytes of its part; beyond these, it is visited again.
+  void count_visited(std::size_t elements, const ModelPart& part) {
+    constexpr std::size_t kMostRepeated = 1 << 25;  // components of components could double with every level
+    num_visited_ += elements;
+    if (num_visited_ > num_bytes_ + kMostRepeated)
+      part.fail(name_, "components repeat objects of more than 33 million vertices and triangles in all");
+  }
+
   Index corner(const ModelPart& part, const pugi::xml_node& triangle, const char* attribute, std::size_t first,
                std::size_t count) const {
     const auto value = parse_integer(triangle.attribute(attribute).value());
@@ -218,6 +226,7 @@ class ThreeMfParser {
   void add_mesh(const ModelPart& part, const pugi::xml_node& object, const pugi::xml_node& mesh,
                 const Transform& transform, const std::string& name) {
     ++num_meshes_;
+    for (const pugi::xml_node child : mesh.children()) count_visited(1 + num_children(child), part);
     const std::size_t first = mesh_.positions.size();
     for (const pugi::xml_node vertex : mesh.child("vertices").children("vertex"))
       mesh_.positions.push_back(transform *
@@ -226,20 +235,24 @@ class ThreeMfParser {
     if (mesh_.positions.size() > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
       part.fail(name_, "more vertices than an index can tell");
     const bool mirrors = transform.linear().determinant() < 0;
-    for (const pugi::xml_node triangle : mesh.child("triangles").children("triangle")) {
+    const pugi::xml_node triangles = mesh.child("triangles");
+    const int place = triangles.child("triangle") ? place_of(name) : -1;
+    for (const pugi::xml_node triangle : triangles.children("triangle")) {
       const Index a = corner(part, triangle, "v1", first, count), b = corner(part, triangle, "v2", first, count),
                   c = corner(part, triangle, "v3", first, count);
       mesh_.face_vertices.insert(mesh_.face_vertices.end(), {a, mirrors ? c : b, mirrors ? b : c});
       mesh_.face_offsets.push_back(mesh_.face_vertices.size());
       add_property(part, object, triangle);
-      names_of_face_.push_back(place_of(name));
+      names_of_face_.push_back(place);
     }
     for (const pugi::xml_node child : mesh.children()) {
       if (local_name(child) == "trianglesets") left_out_.add("sets of triangles", num_children(child));
       if (local_name(child) != "beamlattice") continue;
-      for (const pugi::xml_node list : child.children())
+      for (const pugi::xml_node list : child.children()) {
+        count_visited(num_children(list), part);
         if (const std::string_view kind = local_name(list); kind == "beams" || kind == "balls")
           left_out_.add(kind, num_children(list));
+      }
     }
   }
 
@@ -311,7 +324,8 @@ class ThreeMfParser {
   PolygonMesh mesh_;
   LeftOut left_out_;
   std::vector<std::string> warnings_;
-  std::size_t num_parts_ = 0, num_meshes_ = 0, num_sliced_ = 0;
+  std::size_t num_meshes_ = 0, num_sliced_ = 0;
+  std::size_t num_bytes_ = 0, num_visited_ = 0;  ///< bytes of the parts that were read; see count_visited
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "subvol/io/face_labels.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/position_welder.h"
+#include "subvol/io/scene_nodes.h"
 #include "subvol/io/surface_io.h"
 
 #ifdef SUBVOL_ASSIMP
@@ -20,6 +21,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <set>
 
 namespace subvol::internal {
 
@@ -64,7 +66,12 @@ class SceneParser {
     const Transform transform = above * own;
     for (unsigned m = 0; m < node.mNumMeshes; ++m) {
       if (node.mMeshes[m] >= scene_.mNumMeshes) fail("a node names a mesh that does not exist");
-      add_mesh(*scene_.mMeshes[node.mMeshes[m]], node, transform);
+      const aiMesh& mesh = *scene_.mMeshes[node.mMeshes[m]];
+      constexpr std::size_t kMostRepeated = 1 << 25;  // many nodes may share a large mesh
+      if (!used_meshes_.insert(node.mMeshes[m]).second)
+        num_repeated_ += std::size_t{mesh.mNumVertices} + mesh.mNumFaces;
+      if (num_repeated_ > kMostRepeated) fail("nodes repeat meshes of more than 33 million vertices and faces in all");
+      add_mesh(mesh, node, transform);
     }
     for (unsigned c = 0; c < node.mNumChildren; ++c) add_node(*node.mChildren[c], transform);
   }
@@ -102,6 +109,8 @@ class SceneParser {
 
   const std::string& name_;
   const aiScene& scene_;
+  std::set<unsigned> used_meshes_;
+  std::size_t num_repeated_ = 0;  ///< vertices and faces of meshes that further nodes use
   PositionWelder welder_;
   PolygonMesh mesh_;
   FaceLabels labels_;
@@ -146,8 +155,11 @@ ParsedSurface parse_scene(const std::string& name, std::string_view bytes) {
   std::string text;
   if (extension == ".dae") {
     require_whole_indices(name, bytes);
+    require_sound_collada(name, bytes);
     text = without_leading_blanks(bytes);
     bytes = text;
+  } else {
+    require_sound_fbx(name, bytes);
   }
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);  // pictures of nodes, if there are no meshes
   const aiScene* scene = importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_ValidateDataStructure,

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/binary_value.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/face_labels.h"
@@ -21,14 +22,61 @@ namespace {
 
 using Transform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
 
+/// Throws InputError if values of JSON are in one another so deep that recursion, as that of tinygltf, would take more
+/// than the stack.
+void require_shallow_json(const std::string& name, std::string_view json) {
+  constexpr int kMostDepth = 500;
+  int depth = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (c == '"')
+      in_text = !in_text;
+    else if (in_text)
+      i += c == '\\';
+    else if (c == '[' || c == '{')
+      ++depth;
+    else if (c == ']' || c == '}')
+      --depth;
+    if (depth > kMostDepth) throw InputError(name + ": values nested more than 500 deep");
+  }
+}
+
+/// Returns the JSON of a binary glTF file, as far as it is there: its length stands in the header of the first part.
+std::string_view json_of_binary(std::string_view bytes) {
+  constexpr std::size_t kLength = 12, kHeaders = 20;
+  if (bytes.size() < kHeaders) return {};
+  const double length = decode(bytes.data() + kLength, kUInt32, std::endian::little);
+  return bytes.substr(kHeaders, static_cast<std::size_t>(length));
+}
+
+bool file_exists(const std::string& path, void*) {
+  std::error_code error;
+  return std::filesystem::exists(path, error);
+}
+
+/// Reads a file that a glTF file names. tinygltf itself would wait for a pipe, and take a folder for a huge file.
+bool read_whole_file(std::vector<unsigned char>* content, std::string* errors, const std::string& path, void*) {
+  try {
+    const std::string bytes = read_file(path);
+    content->assign(bytes.begin(), bytes.end());
+    return true;
+  } catch (const InputError& failure) {
+    *errors += failure.what();
+    return false;
+  }
+}
+
 class GltfParser {
  public:
   GltfParser(const std::string& name, std::string_view bytes) : name_(name) { load(bytes); }
 
   ParsedSurface parse() {
     if (model_.scenes.empty()) {
-      for (std::size_t n = 0; n < model_.nodes.size(); ++n)
-        if (!is_child(static_cast<int>(n))) add_node(static_cast<int>(n), Transform::Identity(), 0);
+      std::set<int> children;
+      for (const tinygltf::Node& node : model_.nodes) children.insert(node.children.begin(), node.children.end());
+      for (int n = 0; n < static_cast<int>(model_.nodes.size()); ++n)
+        if (!children.contains(n)) add_node(n, Transform::Identity(), 0);
     } else {
       const std::size_t scene = model_.defaultScene >= 0 ? static_cast<std::size_t>(model_.defaultScene) : 0;
       for (const int node : at(model_.scenes, static_cast<int>(scene), "scene").nodes)
@@ -57,10 +105,12 @@ class GltfParser {
     reader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*,
                              int, void*) { return true; },
                           nullptr);  // pictures do not matter
+    reader.SetFsCallbacks({file_exists, tinygltf::ExpandFilePath, read_whole_file, tinygltf::WriteWholeFile, nullptr});
     std::string errors, warnings;
     const std::string folder = std::filesystem::path(name_).parent_path().string();
     const auto size = static_cast<unsigned>(bytes.size());
     const bool is_binary = bytes.starts_with("glTF");
+    require_shallow_json(name_, is_binary ? json_of_binary(bytes) : bytes);
     const bool read =
         is_binary ? reader.LoadBinaryFromMemory(&model_, &errors, &warnings,
                                                 reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
@@ -69,6 +119,8 @@ class GltfParser {
     if (bytes.starts_with(kBinaryOfVersion1) || model_.asset.version.starts_with("1."))
       fail("glTF 1.0 is not read; convert it to glTF 2.0");
     require_known_extensions();
+    num_bytes_ = bytes.size();
+    for (const tinygltf::Buffer& buffer : model_.buffers) num_bytes_ += buffer.data.size();
     if (read) return;
     std::replace(errors.begin(), errors.end(), '\n', ' ');
     fail("no glTF 2.0 file that can be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
@@ -85,12 +137,6 @@ class GltfParser {
       fail("requires the extension " + in_quotes(extension) + ", which is not read" +
            (extension.ends_with("_compression") ? "; save the file without compression" : ""));
     }
-  }
-
-  bool is_child(int node) const {
-    return std::any_of(model_.nodes.begin(), model_.nodes.end(), [&](const tinygltf::Node& other) {
-      return std::find(other.children.begin(), other.children.end(), node) != other.children.end();
-    });
   }
 
   static Transform transform_of(const tinygltf::Node& node) {
@@ -117,6 +163,7 @@ class GltfParser {
       const tinygltf::Mesh& mesh = at(model_.meshes, node.mesh, "mesh");
       used_meshes_.insert(node.mesh);
       const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
+      count_read(weights.size());
       left_out_.add("skins", node.skin >= 0);
       left_out_.add("weights of morph targets",
                     weights.size() - static_cast<std::size_t>(std::count(weights.begin(), weights.end(), 0.0)));
@@ -128,6 +175,7 @@ class GltfParser {
 
   void add_mesh(const tinygltf::Mesh& mesh, const tinygltf::Node& node, const Transform& transform) {
     for (const tinygltf::Primitive& primitive : mesh.primitives) {
+      count_read(1 + primitive.attributes.size());
       const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
       if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
           mode != TINYGLTF_MODE_TRIANGLE_FAN) {  // points and lines, such as wireframes
@@ -136,7 +184,7 @@ class GltfParser {
       }
       const auto position = primitive.attributes.find("POSITION");
       if (position == primitive.attributes.end()) fail("a primitive without POSITION");
-      const std::vector<double> x = numbers(position->second, 3, "POSITION");
+      const std::vector<double>& x = positions_of(position->second);
       for (const auto& [attribute, place] : primitive.attributes)
         if (const char* missed = what_is_missed(attribute))
           left_out_.add(missed, at(model_.accessors, place, "accessor").count);
@@ -149,10 +197,30 @@ class GltfParser {
       } else {
         for (std::size_t v = 0; v < x.size() / 3; ++v) corners.push_back(v);
       }
+      count_read(corners.size());
       const std::string material =
           primitive.material < 0 ? std::string() : at(model_.materials, primitive.material, "material").name;
       add_triangles(x, corners, mode, transform, material, node.name.empty() ? mesh.name : node.name);
     }
+  }
+
+  /// The coordinates of an accessor. Many programs put all vertices into one, which every primitive names.
+  const std::vector<double>& positions_of(int accessor) {
+    if (accessor != last_accessor_) {
+      last_positions_ = numbers(accessor, 3, "POSITION");
+      last_accessor_ = accessor;
+      count_read(last_positions_.size() / 3);
+    }
+    return last_positions_;
+  }
+
+  /// Counts vertices, corners and the like that are read. Each takes at least a byte of the file or its buffers; beyond
+  /// these, it is read again.
+  void count_read(std::size_t n) {
+    constexpr std::size_t kMostRepeated = 1 << 25;
+    num_read_ += n;
+    if (num_read_ > num_bytes_ + kMostRepeated)
+      fail("nodes repeat meshes of more than 33 million vertices and corners in all");
   }
 
   /// Returns what an attribute of vertices is, for warnings; null for positions, normals and the parts of skins.
@@ -272,6 +340,9 @@ class GltfParser {
   FaceLabels labels_;
   std::set<int> used_meshes_;
   std::size_t num_nodes_ = 0, num_lines_ = 0;
+  std::size_t num_bytes_ = 0, num_read_ = 0;  ///< bytes of the file and its buffers; see count_read
+  int last_accessor_ = -1;                    ///< of `positions_of`
+  std::vector<double> last_positions_;
 };
 
 }  // namespace

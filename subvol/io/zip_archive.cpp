@@ -83,7 +83,7 @@ ZipArchive::ZipArchive(std::string name, std::string_view bytes) : name_(std::mo
   const std::size_t end = bytes.rfind(kEndMark);  // a comment of up to 64 kB follows the end
   if (end == std::string_view::npos || bytes.size() - end < kEndSize) fail("no ZIP archive: its end is missing");
   const Directory directory = directory_of(bytes, end);
-  std::size_t at = directory.begin;
+  std::size_t at = directory.begin, packed_bytes = 0;
   for (std::size_t i = 0; i < directory.count; ++i) {
     if (at > end || end - at < kDirectoryEntrySize || bytes.substr(at, 4) != kDirectoryMark)
       fail("the directory of the ZIP archive is damaged");
@@ -97,6 +97,9 @@ ZipArchive::ZipArchive(std::string name, std::string_view bytes) : name_(std::mo
     if (!read_long_values(bytes.substr(at + kDirectoryEntrySize + name_size, extra),
                           {&entry.size, &entry.packed_size, &entry.header}))
       fail("the directory of the ZIP archive is damaged");
+    // A few bytes that many entries share could stand for any amount of data.
+    if (entry.packed_size > bytes.size() - packed_bytes) fail("the entries of the ZIP archive overlap");
+    packed_bytes += entry.packed_size;
     entries_[std::string(bytes.substr(at + kDirectoryEntrySize, name_size))] = entry;
     at += size;
   }

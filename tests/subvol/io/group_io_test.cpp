@@ -89,6 +89,9 @@ TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
   const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   CHECK(labels(read_groups("a.ply", ply(colors, {"255 0 0", "0 128 0"})).face_groups) == Labels{"#ff0000", "#008000"});
   CHECK(read_groups("a.ply", ply(colors, {"255 0 0", "255 0 0"})).face_groups.empty());
+  const std::array<std::string, 2> large{"1 9007199254740993", "1 9223372036854775807"};  // beyond a double's digits
+  CHECK(labels(read_groups("a.ply", ply(material, large)).face_groups) ==
+        Labels{"material_id 9007199254740993", "material_id 9223372036854775807"});
   const std::string off = "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 255 0 0\n3 0 1 3 0.0 1.0 0.0 1.0\n3 1 2 3\n";
   CHECK(labels(read_groups("a.off", off).face_groups) == Labels{"#ff0000", "#00ff00", ""});
 }

@@ -54,6 +54,9 @@ TEST_CASE("Files that a Nastran file includes are read in its place", "[io][quic
              Contains("a.bdf:5: ") && Contains("none.inc: no such file"));
   CHECK_THAT(nastran_refusal("INCLUDE 'a.bdf'\n"), Contains("8 files in one another"));
   CHECK_THAT(nastran_refusal("INCLUDE 'a.bdf\n"), Contains("a.bdf:1: ") && Contains("quote"));
+  std::string open_quote = "INCLUDE 'a\n";  // all lines behind it could be parts of the path
+  for (int i = 0; i < 20000; ++i) open_quote += "b\n";
+  CHECK_THAT(nastran_refusal(open_quote + "'\n"), Contains("a.bdf:1: ") && Contains("quote"));
   folder.file("parts/wrong.inc", "\nGRID,1,,x\n");
   CHECK_THAT(nastran_refusal("INCLUDE 'parts/wrong.inc'\n"), Contains("wrong.inc:2: "));
 }
@@ -120,6 +123,15 @@ TEST_CASE("Cards of Nastran that repeat the one before them are read", "[io][qui
              Contains("a.bdf:6: ") && Contains("repeated"));
   CHECK_THAT(nastran_refusal(kNastranPoints + "=,*1,=,=,=,*1.\n=(x)\n"), Contains("a.bdf:6: ") && Contains("COUNT"));
   CHECK_THAT(nastran_refusal("=,*1,==\n"), Contains("none before it"));
+}
+
+TEST_CASE("Long cards of Nastran are read, but not repeated", "[io][quick]") {
+  std::string long_card = "SPC1,1,123\n";
+  for (int i = 0; i < 1000; ++i) long_card += ",1,2,3,4,1,2,3,4\n";
+  CHECK(read_nastran(kNastranPoints + long_card + kNastranTet).num_cells() == 1);
+  for (const char* repeat : {"=,*(1),==\n", "=,==\n=(9)\n"})
+    CHECK_THAT(nastran_refusal(kNastranPoints + long_card + repeat + kNastranTet),
+               Contains("a.bdf:5: a card of more than 8 lines is repeated"));
 }
 
 TEST_CASE("Cells of Nastran may be numbered either way", "[io][quick]") {

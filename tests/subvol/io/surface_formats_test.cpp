@@ -18,10 +18,13 @@
 
 #include <map>
 
+#include <sys/stat.h>
+
 using namespace subvol;
 using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
+using namespace std::string_literals;
 
 namespace {
 
@@ -232,6 +235,31 @@ TEST_CASE("surface formats: glTF of a tetrahedron: mirrors, sparse accessors, an
              Contains("KHR_draco_mesh_compression") && Contains("save the file without compression"));
 }
 
+TEST_CASE("surface formats: glTF that names pipes, repeats itself or is nested too deeply is refused", "[io][quick]") {
+  const std::string head = R"({"asset":{"version":"2.0"},)";
+  ::mkfifo((format_folder() / "pipe.bin").c_str(), 0600);
+  for (const auto& [uri, why] :
+       std::map<std::string, std::string>{{"pipe.bin", "is a pipe"}, {".", "is a folder"}, {"none.bin", "not found"}})
+    CHECK_THAT(format_refusal("t.gltf", head + R"("buffers":[{"uri":")" + uri + R"(","byteLength":36}]})"),
+               Contains(why));
+  const auto list = [](const std::string& entry, std::size_t times) {
+    std::string text = entry;
+    for (std::size_t i = 1; i < times; ++i) text += "," + entry;
+    return "[" + text + "]";
+  };
+  const std::string deep = head + R"("extras":)" + std::string(600, '[') + std::string(600, ']') + "}";
+  CHECK_THAT(format_refusal("t.gltf", deep), Contains("500 deep"));
+  CHECK_THAT(format_refusal("t.glb", std::string("glTF\2\0\0\0\0\0\0\0\xff\xff\xff\xffJSON", 20) + deep),
+             Contains("500 deep"));
+  const std::string shallow = head + R"("extras":"\"[)" + std::string(600, '[') + "\"}";
+  CHECK_THAT(format_refusal("t.gltf", shallow), Contains("no faces"));
+  const std::string weights = R"("meshes":[{"primitives":[],"weights":)" + list("0", 100000) + "}],";
+  CHECK_THAT(format_refusal("t.gltf", head + weights + "\"nodes\":" + list("{\"mesh\":0}", 400) + "}"),
+             Contains("repeat meshes"));
+  // The time is not quadratic in the number of nodes.
+  CHECK_THAT(format_refusal("t.gltf", head + "\"nodes\":" + list("{}", 50000) + "}"), Contains("no faces"));
+}
+
 /// Returns an archive of one file as ZIP64: all sizes and places stand in fields of 64 bits.
 std::string as_zip64(const std::string& archive) {
   const std::size_t directory = archive.find("PK\1\2"), end = archive.find("PK\5\6");
@@ -379,6 +407,34 @@ TEST_CASE("surface formats: objects of a .3mf may stand in other parts of the pa
   loop["3D/Objects/b.model"] = model_of(
       R"(<object id="1"><components><component p:path="/3D/Objects/b.model" objectid="1"/></components></object>)", "");
   CHECK_THAT(format_refusal("p.3mf", models_archive(loop)), Contains("include themselves"));
+}
+
+TEST_CASE("surface formats: components of a .3mf repeat no more than can be held", "[io][quick]") {
+  std::string metadata, objects, components;
+  for (int i = 0; i < 10000; ++i) metadata += "<metadatagroup/>";
+  objects = "<object id=\"0\">" + metadata + "</object>";
+  for (int i = 1; i < 13; ++i) {
+    const std::string below = "<component objectid=\"" + std::to_string(i - 1) + "\"/>";
+    objects += "<object id=\"" + std::to_string(i) + "\"><components>" + below + below + "</components></object>";
+  }
+  const auto refused = [&](int top) {
+    const std::string item = "<item objectid=\"" + std::to_string(top) + "\"/>";
+    return format_refusal("r.3mf", models_archive({{"3D/a.model", model_of(objects, item)}}));
+  };
+  CHECK_THAT(refused(3), Contains("no faces"));
+  CHECK_THAT(refused(12), Contains("a.model: components repeat objects"));
+}
+
+TEST_CASE("surface formats: entries of a .3mf that share their bytes are refused", "[io][quick]") {
+  std::string objects;
+  for (int i = 0; i < 200; ++i) objects += tet_object(std::to_string(i));
+  const std::string archive = models_archive({{"3D/a.model", model_of(objects, "<item objectid=\"1\"/>")}});
+  CHECK(format_refusal("z.3mf", archive).empty());
+  const std::size_t directory = archive.find("PK\1\2"), end = archive.find("PK\5\6");
+  std::string entries = archive.substr(directory, end - directory);
+  entries += with_part_replaced(entries, "a.model", "b.model");
+  const std::string two = archive.substr(0, directory) + entries + archive.substr(end).replace(8, 4, "\2\0\2\0"s);
+  CHECK_THAT(format_refusal("z.3mf", two), Contains("overlap"));
 }
 
 TEST_CASE("surface formats: colors of a .3mf are groups, and what is not read is told", "[io][quick]") {
