@@ -160,7 +160,7 @@ std::string vtu(const Encoding& how) {
       content = encode(header(bytes.size()) + bytes);
     }
     if (!how.appended) return "<DataArray " + attributes + " format=\"binary\">\n " + content + "\n</DataArray>";
-    const std::string array =
+    std::string array =
         "<DataArray " + attributes + " format=\"appended\" offset=\"" + std::to_string(appended.size()) + "\"/>";
     appended += content;
     return array;
