@@ -33,7 +33,7 @@ inline VolumeMesh hex_grid(int n, double shake = 0) {
 
 /// The same grid in cells of a kind: each hex in two prisms or six tets around its diagonal.
 inline VolumeMesh cells_of(CellKind kind, int n, double shake = 0) {
-  const VolumeMesh hexes = hex_grid(n, shake);
+  VolumeMesh hexes = hex_grid(n, shake);
   if (kind == CellKind::hex) return hexes;
   static constexpr int kPrisms[2][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}};
   static constexpr int kTets[6][4] = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6},

@@ -149,7 +149,8 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
   energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others
-  FitProblem problem(std::move(nodes), select_rows(nodes, {}), std::move(energy), nullptr, 1);
+  SparseMap samples = select_rows(nodes, {});
+  FitProblem problem(std::move(nodes), std::move(samples), std::move(energy), nullptr, 1);
   problem.fixed_nodes = std::move(fixed);
   problem.projectors = std::move(projectors);
   return problem;

@@ -85,7 +85,7 @@ Cells as_chosen(Cells cells, const std::string& references) {
 TriangleMesh surface_of(Content content, const std::filesystem::path& path, std::vector<std::string>& warnings) {
   if (auto* mesh = std::get_if<VolumeMesh>(&content)) return triangulate(tagged_polygons(*mesh).polygons);
   if (auto* surface = std::get_if<PolygonMesh>(&content))
-    return sound_triangles(std::move(*surface), path.string(), &warnings);
+    return sound_triangles(*surface, path.string(), &warnings);
   refuse_curved(path, "a surface is wanted");
 }
 

@@ -1,26 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/automatic_template.h"
-#include "cli/runs/check_report.h"
-#include "cli/runs/checkpointing.h"
-#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
-#include "cli/runs/face_groups.h"
-#include "cli/runs/loading.h"
-#include "cli/runs/losses.h"
-#include "cli/runs/report.h"
-#include "cli/runs/untangling.h"
-#include "cli/runs/writing.h"
-#include "cli/runs/written_result.h"
 #include "cli/verbs/automatic_fit_run.h"
-#include "cli/verbs/cage_run.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/high_order_fit_run.h"
+#include "cli/verbs/subdivision_fit_run.h"
 #include "cli/verbs/verb_options.h"
-#include "subvol/base/format.h"
-#include "subvol/base/version.h"
-#include "subvol/fit/stages/fit_report.h"
-#include "subvol/fit/subdivision_fit.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
@@ -28,9 +13,9 @@
 
 #include <algorithm>
 #include <array>
-#include <iostream>
 #include <memory>
 #include <optional>
+#include <string>
 
 namespace subvol::cli {
 namespace {
@@ -89,171 +74,6 @@ AutomaticFitOptions template_options(const FitArguments& arguments) {
   options.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
   options.keeps_groups = arguments.fit.keeps_groups;
   return options;
-}
-
-/// One run of `fit` that makes a subdivision volume, from its input files to its output files.
-class FitRun : public CageRun {
- public:
-  FitRun(const FitArguments& arguments, const CLI::App& verb) : CageRun(arguments.run, verb), arguments_(arguments) {}
-  int run();
-
- private:
-  void load();
-  void load_template();
-  void fit();
-  void write();
-  void check();
-  Json report() const;
-  void summarize() const;
-
-  const FitArguments& arguments_;
-  Target target_;
-  std::optional<RegionSurface> regions_;  ///< of the target, if the template has the same
-  Target outer_;                          ///< what the boundary is compared with
-  VolumeMesh template_mesh_;
-  std::optional<AutomaticFitResult> made_;  ///< if the template was made
-  std::optional<Checkpointing> checkpointing_;
-  FitResult result_;
-  GroupsFound groups_;
-  MeshCheck mesh_check_;
-};
-
-void FitRun::load() {
-  target_ = load_target_with_regions(arguments_.target, warnings_);
-  require_fitting_options(verb_, is_cloud(target_));
-  if (const auto* surface = std::get_if<TriangleMesh>(&target_)) warn_of_missing_groups(verb_, *surface, warnings_);
-  if (verb_.count("--lambda-far") > 0 && arguments_.fit.lambda_far < arguments_.fit.lambda_close)
-    warnings_.push_back(
-        internal::formatted("--lambda-far %g has no effect: it is below --lambda-close, %g, from which the weight "
-                            "would be raised",
-                            arguments_.fit.lambda_far, arguments_.fit.lambda_close));
-  if (arguments_.template_mesh.path.empty()) {
-    repair_to_fill(target_, template_options(arguments_).regions, warnings_);
-    // Checked before minutes are spent on making one.
-    require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
-  }
-  tell_warnings();
-}
-
-void FitRun::load_template() {
-  AutomaticFitOptions options = template_options(arguments_);
-  options.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
-  LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
-  template_mesh_ = std::move(loaded.mesh);
-  if (has_few_inverted_cells(template_mesh_))
-    untangle_template(arguments_.template_mesh.path, arguments_.run,
-                      {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
-  made_ = std::move(loaded.made);
-  require_regions(outputs_, regions_of(template_mesh_));
-  FittedTarget fitted = fitted_target(target_, template_mesh_);
-  regions_ = std::move(fitted.regions);
-  outer_ = std::move(fitted.outer);
-  if (!made_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
-  tell_warnings();
-  if (made_ && !arguments_.run.quiet) std::cerr << template_text(*made_);
-}
-
-void FitRun::fit() {
-  FitOptions options = arguments_.fit;
-  options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
-  options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
-  options.correspondence = correspondence(arguments_);
-  options.solver = solver_kind(arguments_);
-  checkpointing_.emplace(
-      run_, run_identity(verb_, {{"target", fingerprint(target_)}, {"template", fingerprint(template_mesh_)}}));
-  options.log = checkpointing_->log();
-  options.keep_states = has_animation(outputs_);
-  options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
-  // Making the template may have used part of the time limit.
-  if (options.time_limit_seconds > 0)
-    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
-  options.point_weights = point_weights(arguments_);
-  options.distortion = distortion(arguments_);
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    return std::visit([&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); },
-                      target_);
-  });
-  checkpointing_->finish(result_.report.warnings);
-  constexpr std::size_t kFarMore = 2;  // times the cells asked for; templates have about as many as they should
-  if (arguments_.cells && result_.mesh.num_cells() > kFarMore * *arguments_.cells)
-    result_.report.warnings.push_back(internal::formatted(
-        "the result has %zu cells, though %zu were asked for: its template has %zu, and --levels %d subdivides "
-        "these; ask for fewer levels",
-        result_.mesh.num_cells(), *arguments_.cells, template_mesh_.num_cells(), options.levels));
-  add_warnings(result_.report.warnings);
-  groups_ = carry_groups(outer_, result_.mesh);
-  carry_groups(outer_, result_.cage);
-  add_warnings(groups_.warnings);
-  add_warnings_of_names(marks_of(result_.mesh));
-}
-
-void FitRun::write() {
-  WritingOptions writing = arguments_.writing;
-  writing.source = arguments_.target;
-  writing.options = options_of_result(verb_);
-  write_cage(result_.cage, result_.mesh, result_.states, writing);
-}
-
-void FitRun::check() {
-  const std::optional<VolumeMesh> written = written_cells(outputs_);
-  const VolumeMesh& mesh = written ? *written : result_.mesh;
-  std::visit(
-      [&](const auto& target) {
-        mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
-      },
-      outer_);
-  measure_limit(result_.cage, outer_, arguments_.writing);
-  hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
-  hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
-  add_warnings(warnings_of_quality(arguments_.fit.quality, mesh_check_));
-  add_warnings(warnings_of_volumes(mesh_check_, regions_));
-  if (arguments_.surface == "limit")
-    hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
-            limit_.mean_percent(mesh_check_.target_diagonal), result_.report);
-}
-
-Json FitRun::report() const {
-  const FitReport& report = result_.report;
-  Json json{{"subvol", version()},
-            {"command", "fit"},
-            {"options", options_in_force(verb_)},
-            {"input",
-             {{"target", describe(arguments_.target, target_)},
-              {"template", describe(arguments_.template_mesh.path, template_mesh_)}}}};
-  if (made_) json["template"] = automatic_fit_json(*made_).at("template");
-  json.update(fit_json(report));
-  json.update(check_json(mesh_check_));
-  if (mesh_check_.regions) json["regions"] = regions_json(*mesh_check_.regions, regions_, template_mesh_);
-  if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
-  if (report.creases) json["creases"] = creases_json(*report.creases);
-  json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));
-  checkpointing_->describe(json);
-  json["audit"] = audit_json(audit(template_mesh_));
-  return json;
-}
-
-void FitRun::summarize() const {
-  const FitReport& report = result_.report;
-  std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
-            << to_text(mesh_check_) << to_text(limit_, mesh_check_.target_diagonal);
-  if (report.creases) std::cerr << to_text(*report.creases);
-  tell_outputs();
-}
-
-int FitRun::run() {
-  prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary, Part::region});
-  timed("read", &FitRun::load);
-  timed("template", &FitRun::load_template);
-  if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
-  timed("fit", &FitRun::fit);
-  timed("write", &FitRun::write);
-  timed("check", &FitRun::check);
-  write_report(report(), seconds_json(result_.report));
-  if (!arguments_.run.quiet) summarize();
-  require_outputs();
-  return status(result_.report, mesh_check_.valid());
 }
 
 void add_method_options(CLI::App& verb, FitArguments& arguments) {
@@ -403,6 +223,21 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   return result;
 }
 
+/// Arguments of the same run with a subdivision volume.
+SubdivisionFitArguments subdivision_arguments(const FitArguments& arguments) {
+  SubdivisionFitArguments result{arguments.run,           arguments.writing, arguments.fit,          arguments.target,
+                                 arguments.template_mesh, arguments.cells,   arguments.quality_floor};
+  result.template_fit = template_options(arguments);
+  FitOptions& fit = result.fit;
+  fit.surface = arguments.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
+  fit.boundary = arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
+  fit.solver = solver_kind(arguments);
+  fit.correspondence = correspondence(arguments);
+  fit.point_weights = point_weights(arguments);
+  fit.distortion = distortion(arguments);
+  return result;
+}
+
 int run_fit(const FitArguments& given, const CLI::App& verb) {
   FitArguments arguments = given;
   if (is_automatic(given, verb)) {
@@ -415,7 +250,7 @@ int run_fit(const FitArguments& given, const CLI::App& verb) {
   arguments.fit.quality = given.quality;
   arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : arguments.fit.levels);
   return given.order > 0 ? run_high_order_fit(high_order_arguments(arguments, verb), verb)
-                         : FitRun(arguments, verb).run();
+                         : run_subdivision_fit(subdivision_arguments(arguments), verb);
 }
 
 void add_solver_options(CLI::App& verb, FitArguments& arguments) {

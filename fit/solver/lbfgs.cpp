@@ -83,88 +83,116 @@ std::vector<Vec3> direction(const std::deque<Pair>& history, const std::vector<V
   return d;
 }
 
-}  // namespace
+/// One minimization of x.
+class Lbfgs {
+ public:
+  Lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
+      : options_(options),
+        objective_(problem),
+        x_(x),
+        gradient_(x.size()),
+        trial_x_(x.size()),
+        trial_gradient_(x.size()) {}
 
-MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
-  MinimizerResult result{MinimizerStop::iteration_limit, "iteration limit", {}};
-  Objective objective(problem);
-  std::vector<Vec3> gradient(x.size()), trial_x(x.size()), trial_gradient(x.size());
-  std::deque<Pair> history;
-  Value value = objective.evaluate(x, gradient);
-  const bool guard = objective.certified(x);
-  if (!std::isfinite(value.energy)) {
-    result.stop = MinimizerStop::infeasible_start;
-    result.explanation = "the start has a cell that is inverted at a quadrature point";
-    return result;
-  }
-  double window_start = value.energy;
-  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-    IterationRecord record;
-    std::vector<Vec3> d = direction(history, gradient);
-    double slope = dot(gradient, d);
-    if (!(slope < 0)) {
-      const bool vanishes = dot(gradient, gradient) == 0;
-      if (!vanishes && !history.empty()) {
-        history.clear();
+  MinimizerResult run() {
+    value_ = objective_.evaluate(x_, gradient_);
+    guard_ = objective_.certified(x_);
+    if (!std::isfinite(value_.energy))
+      return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
+    double window_start = value_.energy;
+    for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+      IterationRecord record;
+      const std::vector<Vec3> d = direction(history_, gradient_);
+      const double slope = dot(gradient_, d);
+      if (!(slope < 0)) {
+        if (dot(gradient_, gradient_) == 0) return end(MinimizerStop::converged, "the gradient vanishes");
+        if (history_.empty()) return end(MinimizerStop::no_step, "there is no direction in which the energy decreases");
+        history_.clear();
         continue;
       }
-      result.stop = vanishes ? MinimizerStop::converged : MinimizerStop::no_step;
-      result.explanation = vanishes ? "the gradient vanishes" : "there is no direction in which the energy decreases";
-      return result;
-    }
-    // Weak Wolfe conditions by bisection, without the curvature condition once an upper end is known. +infinity fails
-    // Armijo's condition, so that the upper end closes in on the feasible part.
-    double low = 0, high = std::numeric_limits<double>::infinity();
-    double t = history.empty() ? std::min(1.0, 1e-3 * std::sqrt(dot(x, x) / dot(d, d))) : 1;
-    Value trial;
-    bool accepted = false;
-    for (int k = 0; k < kMaxTrials && !accepted; ++k) {
-      if (has_ended(options, result)) return result;
-      for (std::size_t i = 0; i < x.size(); ++i) trial_x[i] = x[i] + t * d[i];
-      trial = objective.evaluate(trial_x, trial_gradient);
-      ++record.evaluations;
-      if (!(trial.energy <= value.energy + kArmijo * t * slope) || (guard && !objective.certified(trial_x)))
-        high = t;
-      else if (dot(trial_gradient, d) < kWolfe * slope && k + 1 < kMaxTrials && std::isinf(high))
-        low = t;
-      else
-        accepted = true;
-      if (!accepted) t = std::isinf(high) ? 2 * low : 0.5 * (low + high);
-    }
-    if (!accepted) {
-      if (history.empty()) {
-        result.stop = MinimizerStop::no_step;
-        result.explanation = "no step along the search direction decreases the energy";
-        return result;
+      const Search search = search_line(d, slope, record);
+      if (search == Search::ended) return result_;
+      if (search == Search::failed) {
+        if (history_.empty())
+          return end(MinimizerStop::no_step, "no step along the search direction decreases the energy");
+        history_.clear();
+        continue;
       }
-      history.clear();
-      continue;
+      take_step();
+      record.surface_energy = value_.surface;
+      record.volume_energy = value_.volume;
+      if (!record_step(record, options_, result_)) return result_;
+      if ((iteration + 1) % kWindow != 0) continue;
+      if (window_start - value_.energy < options_.relative_decrease * value_.energy)
+        return end(MinimizerStop::converged, "small relative decrease of the energy in ten steps");
+      window_start = value_.energy;
     }
-    Pair pair{trial_x, trial_gradient, 0};
-    add_scaled(-1, x, pair.s);
-    add_scaled(-1, gradient, pair.y);
+    return result_;
+  }
+
+ private:
+  enum class Search { accepted, failed, ended };
+
+  MinimizerResult end(MinimizerStop stop, const char* explanation) {
+    result_.stop = stop;
+    result_.explanation = explanation;
+    return result_;
+  }
+
+  /// Finds a step along d that meets the weak Wolfe conditions, by bisection; without the curvature condition once an
+  /// upper end is known. +infinity fails Armijo's condition, so that the upper end closes in on the feasible part.
+  /// The trial is at the end of the accepted step.
+  Search search_line(const std::vector<Vec3>& d, double slope, IterationRecord& record) {
+    double low = 0, high = std::numeric_limits<double>::infinity();
+    double t = history_.empty() ? std::min(1.0, 1e-3 * std::sqrt(dot(x_, x_) / dot(d, d))) : 1;
+    for (int k = 0; k < kMaxTrials; ++k) {
+      if (has_ended(options_, result_)) return Search::ended;
+      for (std::size_t i = 0; i < x_.size(); ++i) trial_x_[i] = x_[i] + t * d[i];
+      trial_ = objective_.evaluate(trial_x_, trial_gradient_);
+      ++record.evaluations;
+      if (!(trial_.energy <= value_.energy + kArmijo * t * slope) || (guard_ && !objective_.certified(trial_x_))) {
+        high = t;
+      } else if (dot(trial_gradient_, d) < kWolfe * slope && k + 1 < kMaxTrials && std::isinf(high)) {
+        low = t;
+      } else {
+        record.step_length = t;
+        return Search::accepted;
+      }
+      t = std::isinf(high) ? 2 * low : 0.5 * (low + high);
+    }
+    return Search::failed;
+  }
+
+  /// Goes to the trial, and remembers the step.
+  void take_step() {
+    Pair pair{trial_x_, trial_gradient_, 0};
+    add_scaled(-1, x_, pair.s);
+    add_scaled(-1, gradient_, pair.y);
     const double sy = dot(pair.s, pair.y);
     if (sy > 1e-300) {
       pair.rho = 1 / sy;
-      history.push_back(std::move(pair));
-      if (history.size() > kHistory) history.pop_front();
+      history_.push_back(std::move(pair));
+      if (history_.size() > kHistory) history_.pop_front();
     }
-    x = trial_x;
-    gradient = trial_gradient;
-    value = trial;
-    record.surface_energy = value.surface;
-    record.volume_energy = value.volume;
-    record.step_length = t;
-    if (!record_step(record, options, result)) return result;
-    if ((iteration + 1) % kWindow != 0) continue;
-    if (window_start - value.energy < options.relative_decrease * value.energy) {
-      result.stop = MinimizerStop::converged;
-      result.explanation = "small relative decrease of the energy in ten steps";
-      return result;
-    }
-    window_start = value.energy;
+    x_ = trial_x_;
+    gradient_ = trial_gradient_;
+    value_ = trial_;
   }
-  return result;
+
+  const MinimizerOptions& options_;
+  MinimizerResult result_{MinimizerStop::iteration_limit, "iteration limit", {}};
+  Objective objective_;
+  std::vector<Vec3>& x_;
+  std::vector<Vec3> gradient_, trial_x_, trial_gradient_;
+  std::deque<Pair> history_;
+  Value value_, trial_;
+  bool guard_ = false;  ///< true if no step may lose the certificate that the start has
+};
+
+}  // namespace
+
+MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
+  return Lbfgs(problem, x, options).run();
 }
 
 }  // namespace subvol::internal

@@ -71,7 +71,7 @@ bool is_positive_definite(const Mat3& block) {
 /// Returns the inverse of a block, or that of its trace times the identity if the block is not positive definite.
 Mat3 positive_inverse(const Mat3& block, double trace) {
   if (is_positive_definite(block)) {
-    const Mat3 inverse = block.inverse();
+    Mat3 inverse = block.inverse();
     if (inverse.allFinite()) return inverse;
   }
   return Mat3::Identity() / trace;

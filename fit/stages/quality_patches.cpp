@@ -33,13 +33,10 @@ std::vector<Index> marked_ones(const std::vector<std::uint8_t>& marks) {
   return result;
 }
 
-}  // namespace
-
-std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProblem& problem,
-                                          std::span<const std::array<Index, 3>> triangles,
-                                          std::span<const Index> centers, int rings, std::size_t most_cells) {
-  const VertexCells cells_of(mesh);
-  std::vector<std::uint8_t> is_core(mesh.num_cells(), 0), is_free(problem.nodes.num_cols, 0);
+/// Marks the cells around the centers: them and so many rings of cells that share a vertex.
+std::vector<std::uint8_t> core_cells(const VolumeMesh& mesh, const VertexCells& cells_of,
+                                     std::span<const Index> centers, int rings) {
+  std::vector<std::uint8_t> is_core(mesh.num_cells(), 0);
   std::vector<Index> front(centers.begin(), centers.end());
   for (const Index c : front) is_core[c] = 1;
   for (int ring = 0; ring < rings; ++ring) {
@@ -50,7 +47,40 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
           if (!std::exchange(is_core[other], std::uint8_t{1})) next.push_back(other);
     front = std::move(next);
   }
-  for (const Index c : marked_ones(is_core))
+  return is_core;
+}
+
+/// Joins the unknowns that are free and move one cell, or one triangle. Each has a set that one of them stands for.
+class JoinedUnknowns {
+ public:
+  explicit JoinedUnknowns(std::span<const std::uint8_t> is_free) : is_free_(is_free), sets_(is_free.size()) {}
+
+  /// Joins those of which the vertices, or samples, are made. Returns one of them; kNoIndex if none is free.
+  Index join(const SparseMap& map, std::span<const Index> rows) {
+    Index first = kNoIndex;
+    for (const Index row : rows)
+      for (const Index j : map.row_columns(row)) {
+        if (!is_free_[j]) continue;
+        if (first == kNoIndex) first = j;
+        sets_.join(first, j);
+      }
+    return first;
+  }
+  Index set_of(Index unknown) { return sets_.of(unknown); }
+
+ private:
+  std::span<const std::uint8_t> is_free_;
+  DisjointSets sets_;
+};
+
+}  // namespace
+
+std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProblem& problem,
+                                          std::span<const std::array<Index, 3>> triangles,
+                                          std::span<const Index> centers, int rings, std::size_t most_cells) {
+  const VertexCells cells_of(mesh);
+  std::vector<std::uint8_t> is_free(problem.nodes.num_cols, 0);
+  for (const Index c : marked_ones(core_cells(mesh, cells_of, centers, rings)))
     for (const Index v : mesh.cell(c))
       for (const Index j : problem.nodes.row_columns(v)) is_free[j] = 1;
 
@@ -63,30 +93,15 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
   const std::vector<Index> active = marked_ones(is_active);
   if (active.size() > most_cells) return {};
 
-  DisjointSets sets(problem.nodes.num_cols);
-  std::vector<Index> set_of_cell;
-  for (const Index c : active) {
-    Index first = kNoIndex;
-    for (const Index v : mesh.cell(c))
-      for (const Index j : problem.nodes.row_columns(v)) {
-        if (!is_free[j]) continue;
-        if (first == kNoIndex) first = j;
-        sets.join(first, j);
-      }
-    set_of_cell.push_back(first);
-  }
-  std::vector<Index> free_of_triangle(triangles.size(), kNoIndex);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    for (const Index sample : triangles[t])
-      for (const Index j : problem.samples.row_columns(sample)) {
-        if (!is_free[j]) continue;
-        if (free_of_triangle[t] == kNoIndex) free_of_triangle[t] = j;
-        sets.join(free_of_triangle[t], j);
-      }
+  JoinedUnknowns joined(is_free);
+  std::vector<Index> free_of_cell, free_of_triangle;
+  for (const Index c : active) free_of_cell.push_back(joined.join(problem.nodes, mesh.cell(c)));
+  for (const auto& triangle : triangles) free_of_triangle.push_back(joined.join(problem.samples, triangle));
+
   std::vector<QualityPatch> patches;
   std::vector<Index> patch_of_set(problem.nodes.num_cols, kNoIndex);
   for (const Index j : free) {
-    Index& patch = patch_of_set[sets.of(j)];
+    Index& patch = patch_of_set[joined.set_of(j)];
     if (patch == kNoIndex) {
       patch = static_cast<Index>(patches.size());
       patches.emplace_back();
@@ -94,14 +109,14 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
     patches[patch].unknowns.push_back(j);
   }
   for (std::size_t i = 0; i < active.size(); ++i) {
-    QualityPatch& patch = patches[patch_of_set[sets.of(set_of_cell[i])]];
+    QualityPatch& patch = patches[patch_of_set[joined.set_of(free_of_cell[i])]];
     patch.cells.push_back(active[i]);
     const auto vertices = mesh.cell(active[i]);
     patch.vertices.insert(patch.vertices.end(), vertices.begin(), vertices.end());
   }
   for (std::size_t t = 0; t < triangles.size(); ++t)
     if (const Index j = free_of_triangle[t]; j != kNoIndex)
-      patches[patch_of_set[sets.of(j)]].triangles.push_back(static_cast<Index>(t));
+      patches[patch_of_set[joined.set_of(j)]].triangles.push_back(static_cast<Index>(t));
   for (QualityPatch& patch : patches) {
     std::sort(patch.vertices.begin(), patch.vertices.end());
     patch.vertices.erase(std::unique(patch.vertices.begin(), patch.vertices.end()), patch.vertices.end());

@@ -313,7 +313,8 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
   return sound_triangles(read_polygon_mesh(path, warnings), path.string(), warnings);
 }
 
-TriangleMesh sound_triangles(PolygonMesh polygons, const std::string& name, std::vector<std::string>* warnings) {
+TriangleMesh sound_triangles(const PolygonMesh& polygons, const std::string& name,
+                             std::vector<std::string>* warnings) {
   Remarks remarks(name, warnings);
   TriangleMesh mesh = triangulate(polygons);
   const std::size_t num_flat =

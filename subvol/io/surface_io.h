@@ -43,7 +43,8 @@ TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<s
 /// Checks polygons that come from elsewhere as `read_polygon_mesh` does with those of a file, or triangles as
 /// `read_triangle_mesh`. name: their source for messages.
 PolygonMesh sound_polygons(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings = nullptr);
-TriangleMesh sound_triangles(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings = nullptr);
+TriangleMesh sound_triangles(const PolygonMesh& mesh, const std::string& name,
+                             std::vector<std::string>* warnings = nullptr);
 
 /// Smallest number of points that a cloud may have.
 inline constexpr std::size_t kLeastCloudPoints = 10;

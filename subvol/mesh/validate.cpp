@@ -318,7 +318,8 @@ class Validator {
       int bad = 0, first = -1;
       for (int i = 0; i < topology.num_trivalent; ++i) {
         const auto& n = topology.corner_neighbors[i];
-        const Vec3 x = position(i), e0 = position(n[0]) - x, e1 = position(n[1]) - x, e2 = position(n[2]) - x;
+        const Vec3& x = position(i);
+        const Vec3 e0 = position(n[0]) - x, e1 = position(n[1]) - x, e2 = position(n[2]) - x;
         if (e0.cross(e1).dot(e2) > 0) continue;
         if (bad++ == 0) first = i;
       }

@@ -16,66 +16,108 @@ namespace {
 /// Prefix for messages: a closed surface is the boundary of a volume mesh.
 std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
 
+/// The corners at each edge.
+///
+/// Each corner is kept in a list at the end of its edge that has fewer corners: lookups are short even next to a vertex
+/// that all faces share.
+class CornerLists {
+ public:
+  CornerLists(const SurfaceTopology& surface, std::size_t num_vertices)
+      : surface_(surface),
+        valence_(num_vertices, 0),
+        head_(num_vertices, kNoIndex),
+        next_(surface.corner_vertices.size()) {
+    for (const Index v : surface.corner_vertices) ++valence_[v];
+    for (std::size_t h = next_.size(); h-- > 0;) {
+      const Index corner = static_cast<Index>(h);
+      Index& first = head_[hook(begin(corner), end(corner))];
+      next_[h] = first;
+      first = corner;
+    }
+  }
+
+  Index begin(Index corner) const { return surface_.corner_vertices[corner]; }
+  Index end(Index corner) const { return surface_.corner_vertices[surface_.next(corner)]; }
+
+  /// The corners of the edge of a corner h.
+  struct Edge {
+    Index first = kNoIndex;      ///< the least of them
+    Index twin = kNoIndex;       ///< the last one that runs back
+    Index other = kNoIndex;      ///< the last one but h that runs the same way
+    int same = 0, opposite = 0;  ///< how many run which way; h is counted
+  };
+  Edge edge_of(Index h) const {
+    const Index from = begin(h), to = end(h);
+    Edge edge;
+    for (Index g = head_[hook(from, to)]; g != kNoIndex; g = next_[g]) {  // ascending
+      const bool runs_back = begin(g) == to && end(g) == from, runs_along = begin(g) == from && end(g) == to;
+      if (edge.first == kNoIndex && (runs_back || runs_along)) edge.first = g;
+      if (runs_back) edge.twin = g, ++edge.opposite;
+      if (!runs_along) continue;
+      ++edge.same;
+      if (g != h) edge.other = g;
+    }
+    return edge;
+  }
+
+ private:
+  Index hook(Index a, Index b) const {
+    return valence_[a] < valence_[b] || (valence_[a] == valence_[b] && a < b) ? a : b;
+  }
+
+  const SurfaceTopology& surface_;
+  std::vector<Index> valence_, head_, next_;
+};
+
+/// The edges that a surface must not have.
+struct WrongEdges {
+  CrowdedEdges crowded;
+  PlaceList turned, unpaired;
+};
+
+void refuse(const WrongEdges& edges, SurfaceKind kind) {
+  if (!edges.crowded.empty())
+    throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + edges.crowded.text());
+  if (!edges.turned.empty())
+    throw InputError(
+        edges.turned.text(prefix(kind) + "edge has two faces that run the same way along it: their normals disagree",
+                          prefix(kind) + "edges have two faces that run the same way along them: their normals "
+                                         "disagree"));
+  if (!edges.unpaired.empty())
+    throw InputError(edges.unpaired.text(prefix(kind) + "edge lies at one face instead of between two",
+                                         prefix(kind) + "edges lie at one face instead of between two"));
+}
+
 void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind,
                   std::span<const Vec3> positions) {
   const std::size_t num_corners = surface.corner_vertices.size();
   surface.vertex_corners.assign(num_vertices, kNoIndex);
-  std::vector<Index> valence(num_vertices, 0);
-  for (std::size_t h = num_corners; h-- > 0;) {
-    const Index v = surface.corner_vertices[h];
-    surface.vertex_corners[v] = static_cast<Index>(h);
-    ++valence[v];
-  }
-  // Each corner is kept in a list at the end of its edge that has fewer corners: lookups are short even next to a
-  // vertex that all faces share.
-  std::vector<Index> head(num_vertices, kNoIndex), next(num_corners);
-  const auto hook = [&](Index a, Index b) {
-    return valence[a] < valence[b] || (valence[a] == valence[b] && a < b) ? a : b;
-  };
-  for (std::size_t h = num_corners; h-- > 0;) {
-    const Index corner = static_cast<Index>(h);
-    Index& first = head[hook(surface.corner_vertices[h], surface.corner_vertices[surface.next(corner)])];
-    next[h] = first;
-    first = corner;
-  }
+  for (std::size_t h = num_corners; h-- > 0;)
+    surface.vertex_corners[surface.corner_vertices[h]] = static_cast<Index>(h);
   surface.twins.assign(num_corners, kNoIndex);
   surface.corner_edges.assign(num_corners, kNoIndex);
   surface.edge_corners.reserve(num_corners / 2);
-  const auto joins = [&](Index g, Index v, Index w) {
-    const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
-    return (begin == v && end == w) || (begin == w && end == v);
-  };
-  CrowdedEdges crowded;
-  PlaceList turned, unpaired;  // edges
   const auto vertex = [&](Index v) {
     return vertex_text(names.empty() ? v : names[static_cast<std::size_t>(v)],
                        positions.empty() ? nullptr : &positions[static_cast<std::size_t>(v)]);
   };
+  const CornerLists corners(surface, num_vertices);
+  WrongEdges wrong;
   for (std::size_t i = 0; i < num_corners; ++i) {
     const Index h = static_cast<Index>(i);
-    const Index from = surface.corner_vertices[h], to = surface.corner_vertices[surface.next(h)];
-    Index twin = kNoIndex, other = kNoIndex;  // the corner that runs back, and another one that runs the same way
-    int same = 0, opposite = 0;
-    for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g]) {
-      const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
-      if (begin == to && end == from) twin = g, ++opposite;
-      if (begin == from && end == to) {
-        ++same;
-        if (g != h) other = g;
-      }
-    }
+    const auto [first, twin, other, same, opposite] = corners.edge_of(h);
     const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
     if (same + opposite > 2) {
-      bool is_first = true;  // true if h is the first corner of this edge
-      for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g])
-        is_first = is_first && (g >= h || !joins(g, from, to));
-      if (is_first) crowded.add(vertex(from), vertex(to), static_cast<std::size_t>(same + opposite));
+      if (h == first)
+        wrong.crowded.add(vertex(corners.begin(h)), vertex(corners.end(h)), static_cast<std::size_t>(same + opposite));
       continue;
     }
     if (same != 1 || (opposite != 1 && !border)) {
-      const std::string edge = "from vertex " + vertex(from) + " to " + vertex(to);
-      if (same == 1) unpaired.add(edge);
-      else if (h < other) turned.add(edge);
+      const std::string edge = "from vertex " + vertex(corners.begin(h)) + " to " + vertex(corners.end(h));
+      if (same == 1)
+        wrong.unpaired.add(edge);
+      else if (h < other)
+        wrong.turned.add(edge);
       continue;
     }
     surface.twins[h] = twin;
@@ -86,15 +128,7 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       surface.corner_edges[h] = surface.corner_edges[twin];
     }
   }
-  if (!crowded.empty()) throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + crowded.text());
-  if (!turned.empty())
-    throw InputError(
-        turned.text(prefix(kind) + "edge has two faces that run the same way along it: their normals disagree",
-                    prefix(kind) + "edges have two faces that run the same way along them: their normals "
-                                   "disagree"));
-  if (!unpaired.empty())
-    throw InputError(unpaired.text(prefix(kind) + "edge lies at one face instead of between two",
-                                   prefix(kind) + "edges lie at one face instead of between two"));
+  refuse(wrong, kind);
 }
 
 void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind,

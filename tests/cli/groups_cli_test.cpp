@@ -174,7 +174,7 @@ TEST_CASE("Groups go through every format that holds them, on the command line",
   const Workplace place;
   write_volume_mesh(place / "b.mesh", test::with_floor_and_roof(test::lattice(1, 1, 1), 1));
   const auto run = [&](const std::string& words) {
-    const Run done = place.run(words);
+    Run done = place.run(words);
     INFO(words << '\n' << done.err);
     CHECK(done.status == 0);
     return done;

@@ -29,7 +29,7 @@ namespace {
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Two quads that share an edge, with a segment node, far from zero.
-Scene two_quads(Vec3 offset = Vec3(1e5, -2e5, 3e4)) {
+Scene two_quads(const Vec3& offset = Vec3(1e5, -2e5, 3e4)) {
   ScenePrimitive quads;
   quads.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0.1}, {0, 1, 0}, {1, 1, 0}, {2, 1, 0.1}};
   for (Vec3& p : quads.positions) p += offset;

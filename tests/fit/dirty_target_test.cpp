@@ -22,7 +22,6 @@
 using namespace subvol;
 using namespace subvol::internal;
 using namespace subvol::test;
-using Catch::Contains;
 
 namespace {
 

@@ -24,7 +24,7 @@ namespace {
 
 /// A lattice of n^3 cubes, each cut into cells of one kind: 1 hex, 2 prisms, 6 tets, 6 pyramids.
 VolumeMesh cut_lattice(int n, CellKind kind) {
-  const VolumeMesh cubes = test::lattice(n, n, n);
+  VolumeMesh cubes = test::lattice(n, n, n);
   if (kind == CellKind::hex) return cubes;
   if (kind == CellKind::pyramid) return test::pyramid_lattice(n);
   VolumeMesh mesh;

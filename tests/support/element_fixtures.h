@@ -20,7 +20,7 @@ class PointSource {
   Vec3 vector() { return Vec3(number(), number(), number()); }
   Vec3 inside(CellKind kind) {
     while (true) {
-      const Vec3 p = vector();
+      Vec3 p = vector();
       if (kind == CellKind::hex || (kind == CellKind::prism && p[0] + p[1] <= 1) ||
           (kind == CellKind::tet && p.sum() <= 1))
         return p;

@@ -12,7 +12,7 @@ using namespace subvol::cli;
 
 namespace {
 
-Verdict judged(int exit_code, int signal, Remains remains = {.has_outputs = true}) {
+Verdict judged(int exit_code, int signal, const Remains& remains = {.has_outputs = true}) {
   ChildEnd end;
   end.exit_code = exit_code;
   end.signal = signal;

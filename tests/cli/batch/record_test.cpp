@@ -19,7 +19,6 @@
 #include <unistd.h>
 
 using namespace subvol::cli;
-using subvol::test::content_of;
 using subvol::test::TemporaryFolder;
 namespace fs = std::filesystem;
 

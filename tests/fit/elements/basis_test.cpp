@@ -150,7 +150,7 @@ TEST_CASE("vertex functions are linear and sum to one; modes vanish at vertices 
       // On every face: functions of the cell, and of vertices and edges that are not of the face, are zero.
       for (int f = 0; f < topology.num_faces; ++f) {
         const auto& face = topology.faces[f];
-        const Vec3 a = corners[face[0]], b = corners[face[1]], d = corners[face[topology.face_sizes[f] - 1]];
+        const Vec3 &a = corners[face[0]], &b = corners[face[1]], &d = corners[face[topology.face_sizes[f] - 1]];
         shapes.set_point(a + 0.3 * (b - a) + 0.4 * (d - a));
         for_each_mode(entity_shape(kind), 6,
                       [&](ModeIndex m) { CHECK(std::abs(shapes.value(cell_mode(kind, m))) < 1e-15); });

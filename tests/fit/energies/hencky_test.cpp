@@ -178,7 +178,8 @@ TEST_CASE(
       Mat3 shape;
       shape << 1.2, 0.3, -0.1, 0.1, 0.8, 0.2, -0.2, 0.1, 0.1;
       const Mat3 reference = shape * ideal_matrix(kind);
-      const VolumeEnergy energy(mesh, [&](Index, const Vec3&) { return reference; }, n);
+      const VolumeEnergy energy(
+          mesh, [&](Index, const Vec3&) -> const Mat3& { return reference; }, n);
       std::vector<Vec3> x = mesh.positions, d(x.size());
       for (Vec3& p : x) p = shape * p;
       CHECK(energy.value(x) < 1e-26);

@@ -50,7 +50,7 @@ TEST_CASE("orders rise by half of what they are, up to the greatest, and keep th
 TEST_CASE("the gain of one new mode is what its own Newton step takes off the surface energy", "[elements]") {
   const samples::Sample sample = samples::ball_sample();
   const ElementSpace space(sample.template_mesh, Basis::fourier, 1);
-  const EntityOrders now = space.orders();
+  const EntityOrders& now = space.orders();
   const HighOrderMesh raised = HighOrderMesh(space, sample.template_mesh).with_orders(next_orders(now, 2));
   const TargetSurface target(sample.target);
   constexpr double kNoShape = 1e-12;

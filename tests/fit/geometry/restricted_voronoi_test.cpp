@@ -8,7 +8,9 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <limits>
 
 using namespace subvol;
@@ -121,9 +123,10 @@ double sampled_distance_integral(const TriangleMesh& mesh, const std::vector<Vec
 }
 
 bool same_bits(const std::vector<VoronoiPiece>& a, const std::vector<VoronoiPiece>& b) {
+  using Bits = std::array<std::uint64_t, 6>;
   return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& p, const auto& q) {
            return p.triangle == q.triangle && p.site == q.site &&
-                  std::memcmp(p.moments.data(), q.moments.data(), sizeof p.moments) == 0;
+                  std::bit_cast<Bits>(p.moments) == std::bit_cast<Bits>(q.moments);
          });
 }
 

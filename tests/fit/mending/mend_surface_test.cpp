@@ -133,7 +133,7 @@ TEST_CASE("A surface without faults is not mended, nor is one of quads", "[mendi
 TEST_CASE("A face without area between two others goes, whichever way its edges run", "[mending]") {
   TriangleMesh cube = cube_surface(4, false);
   const auto [a, b, c] = cube.triangles[5];
-  const auto next = std::find_if(cube.triangles.begin(), cube.triangles.end(), [&](const auto& t) {
+  const auto next = std::find_if(cube.triangles.begin(), cube.triangles.end(), [a = a, b = b](const auto& t) {
     return (t[0] == b && t[1] == a) || (t[1] == b && t[2] == a) || (t[2] == b && t[0] == a);
   });
   REQUIRE(next != cube.triangles.end());

@@ -76,7 +76,7 @@ struct BentWall final : Wall {
 TEST_CASE("Only a gradient of zero counts as one that vanishes") {
   std::vector<Vec3> densified_at;
   const SparseMap identity{1, {0, 1}, {0}, {1}};
-  const auto minimized = [&](const Mat3& hessian, Vec3 start) {
+  const auto minimized = [&](const Mat3& hessian, const Vec3& start) {
     FitProblem problem(identity, select_rows(identity, {}), std::make_unique<BentWall>(densified_at, hessian), nullptr,
                        1);
     std::vector<Vec3> x = {start};

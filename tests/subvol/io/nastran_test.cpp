@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Nastran files of other programs have includes, coordinate systems, repeated cards and cells numbered either way.
-#include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/nodal_fixtures.h"
 
 #include <catch2/catch.hpp>
 
@@ -15,21 +14,9 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-const TemporaryFolder& nastran_folder() {
-  static const TemporaryFolder kFolder;
-  return kFolder;
-}
+NodalMesh read_nastran(std::string_view bytes) { return read_nodal_text("a.bdf", bytes); }
 
-NodalMesh read_nastran(std::string_view bytes) { return read_nodal_mesh(nastran_folder().file("a.bdf", bytes)); }
-
-std::string nastran_refusal(std::string_view bytes) {
-  try {
-    read_nastran(bytes);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+std::string nastran_refusal(std::string_view bytes) { return nodal_refusal("a.bdf", bytes); }
 
 const std::string kNastranPoints = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n";
 const std::string kNastranTet = "CTETRA,1,1,1,2,3,4\n";
@@ -39,7 +26,7 @@ bool is_near(const Vec3& a, const Vec3& b) { return (a - b).norm() < 1e-12; }
 }  // namespace
 
 TEST_CASE("Files that a Nastran file includes are read in its place", "[io][quick]") {
-  const TemporaryFolder& folder = nastran_folder();
+  const TemporaryFolder& folder = nodal_folder();
   std::filesystem::create_directory(folder / "parts");
   folder.file("parts/points.inc", "$ two\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\ninclude 'parts/more.inc'\n");
   folder.file("parts/more.inc", "GRID,3,,0.,1.,0.\nINCLUDE last.inc $ beside this file\n");
@@ -139,7 +126,7 @@ TEST_CASE("Cells of Nastran may be numbered either way", "[io][quick]") {
                              "GRID,5,,1.,1.,1.\nGRID,6,,9.,0.,0.\nGRID,7,,8.,0.,0.\nGRID,8,,8.,1.,0.\n"
                              "GRID,9,,8.,0.,1.\n";
   const std::string lone = "CTETRA,3,1,7,8,6,9\n";  // left-handed, without neighbors
-  const auto path = nastran_folder().file("b.bdf", points + kNastranTet + "CTETRA,2,1,2,4,3,5\n" + lone);
+  const auto path = nodal_folder().file("b.bdf", points + kNastranTet + "CTETRA,2,1,2,4,3,5\n" + lone);
   std::vector<std::string> warnings;
   const VolumeMesh mesh = read_volume_mesh(path, {.check = false, .warnings = &warnings});
   REQUIRE(mesh.num_cells() == 3);
@@ -189,7 +176,7 @@ TEST_CASE("Cards of Nastran that are incomplete, doubled or curved pyramids are 
 
 TEST_CASE("Shells of Nastran without cells are a surface", "[io][quick]") {
   const auto path =
-      nastran_folder().file("s.bdf", kNastranPoints + "CTRIA3,1,5,1,2,3\nCQUAD4,2,6,1,2,3,4\nCBAR,3,1,1,2\n");
+      nodal_folder().file("s.bdf", kNastranPoints + "CTRIA3,1,5,1,2,3\nCQUAD4,2,6,1,2,3,4\nCBAR,3,1,1,2\n");
   std::vector<std::string> warnings;
   const FileCells cells = read_cells(path, {.warnings = &warnings});
   const auto* surface = std::get_if<PolygonMesh>(&cells);
@@ -198,4 +185,48 @@ TEST_CASE("Shells of Nastran without cells are a surface", "[io][quick]") {
   CHECK(surface->face_groups.groups == std::vector<Group>{{"", 5, 2}, {"", 6, 2}});
   REQUIRE(warnings.size() == 1);
   CHECK_THAT(warnings[0], Contains("CBAR"));
+}
+
+TEST_CASE("nodal_mesh: small, large and free fields of Nastran, with its numbers", "[io]") {
+  const std::string text =
+      "SOL 101\nCEND\nBEGIN BULK\n"
+      "GRID           1              0.      0.      0.\n"
+      "GRID*                  2                            1.-0             0.\n*                      0.\n"
+      "GRID,3,0,0.,1.,0.\n"
+      "$ a comment\n"
+      "GRID,4,,0.,0.,\n"
+      "GRID           5              .5      0.    -1-1\n"
+      "CTETRA         1       3       1       2       3       4       5        +A\n"
+      "+A\n"
+      "PSOLID,3,1\nCQUAD4,9,4,1,2,3,4\nENDDATA\nrubbish\n";
+  std::string fixed = text;
+  fixed.replace(fixed.find("GRID,4,,0.,0.,"), 14, "GRID,4,,0.,0.,1.+0");
+  const NodalMesh mesh = read_nastran(fixed);
+  REQUIRE(mesh.num_cells() == 1);
+  CHECK(mesh.orders[0] == 2);
+  CHECK(mesh.references == std::vector<int>{3});
+  CHECK(mesh.face_groups.groups == std::vector<Group>{{"", 4, 2}});
+  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[4])] == Vec3(0.5, 0, -0.1));
+  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[5])] == Vec3(0.5, 0.5, 0));  // left out: straight
+  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[3])] == Vec3(0, 0, 1));
+  CHECK_THAT(nastran_refusal("BEGIN BULK\nGRID,1,5,0.,0.,0.\n"), Contains("a.bdf:2:") && Contains("coordinate system"));
+  CHECK_THAT(nastran_refusal("GRID,1,,0.,0.,x\n"), Contains("finite number"));
+  CHECK_THAT(nastran_refusal("CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
+}
+
+TEST_CASE("Pyramids of Nastran have two names, and elements of unknown names are counted") {
+  std::string text = "BEGIN BULK\nCORD2R,1\n";
+  const Vec3 points[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
+  for (int i = 0; i < 5; ++i)
+    text += "GRID," + std::to_string(i + 1) + ",," + std::to_string(points[i].x()) + "," +
+            std::to_string(points[i].y()) + "," + std::to_string(points[i].z()) + "\n";
+  for (const char* name : {"CPYRA", "CPYRAM"}) {
+    const NodalMesh mesh = read_nastran(text + name + ",1,1,1,2,3,4,5\nENDDATA\n");
+    REQUIRE(mesh.num_cells() == 1);
+    CHECK(mesh.warnings.empty());
+  }
+  const NodalMesh mesh = read_nastran(text + "CPYRA,1,1,1,2,3,4,5\nCTETRX,2,1,1,2,3,5\nENDDATA\n");
+  CHECK(mesh.num_cells() == 1);
+  REQUIRE(mesh.warnings.size() == 1);
+  CHECK_THAT(mesh.warnings[0], Contains("1 elements of type CTETRX"));
 }

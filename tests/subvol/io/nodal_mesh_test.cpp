@@ -2,12 +2,11 @@
 #include "subvol/io/nodal_mesh.h"
 
 #include "subvol/base/base64.h"
-#include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/mfem_numbering.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/io/node_points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/nodal_fixtures.h"
 
 #include <catch2/catch.hpp>
 #include <zlib.h>
@@ -22,24 +21,6 @@ using namespace subvol::test;
 using Catch::Matchers::Contains;
 
 namespace {
-
-const TemporaryFolder& nodal_folder() {
-  static const TemporaryFolder kFolder;
-  return kFolder;
-}
-
-NodalMesh read(const std::string& name, std::string_view bytes, const std::string& references = {}) {
-  return read_nodal_mesh(nodal_folder().file(name, bytes), references);
-}
-
-std::string nodal_refusal(const std::string& name, std::string_view bytes) {
-  try {
-    read(name, bytes);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 template <class T>
 std::string raw(std::initializer_list<T> values) {
@@ -70,7 +51,7 @@ const std::string kMsh41 =
 }  // namespace
 
 TEST_CASE("nodal_mesh: Gmsh 4.1 with sparse tags, parametric nodes, groups and names", "[io]") {
-  const NodalMesh mesh = read("a.msh", kMsh41);
+  const NodalMesh mesh = read_nodal_text("a.msh", kMsh41);
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{7});
   REQUIRE(mesh.regions.size() == 1);
@@ -82,17 +63,19 @@ TEST_CASE("nodal_mesh: Gmsh 4.1 with sparse tags, parametric nodes, groups and n
 }
 
 TEST_CASE("nodal_mesh: a .mesh may be Gmsh's", "[io]") {
-  require_unit_tet(read("a.mesh", kMsh41));
+  require_unit_tet(read_nodal_text("a.mesh", kMsh41));
   CHECK(read_volume_mesh(nodal_folder() / "a.mesh").num_cells() == 1);
 }
 
 TEST_CASE("nodal_mesh: Gmsh 4.0 and 2.2 in text", "[io]") {
-  require_unit_tet(read("a.msh", "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
-                                 "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
-                                 "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n"));
-  const NodalMesh old = read("b.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n"
-                                      "4 0 0 1\n$EndNodes\n$Elements\n3\n1 15 2 0 1 9\n2 2 2 8 1 9 5 3\n"
-                                      "3 4 4 6 1 1 2 9 3 5 4\n$EndElements\n");
+  require_unit_tet(read_nodal_text("a.msh",
+                                   "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
+                                   "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
+                                   "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n"));
+  const NodalMesh old = read_nodal_text("b.msh",
+                                        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n"
+                                        "4 0 0 1\n$EndNodes\n$Elements\n3\n1 15 2 0 1 9\n2 2 2 8 1 9 5 3\n"
+                                        "3 4 4 6 1 1 2 9 3 5 4\n$EndElements\n");
   require_unit_tet(old);
   CHECK(old.references == std::vector<int>{6});
   CHECK(old.face_groups.groups == std::vector<Group>{{"", 8, 2}});
@@ -104,7 +87,7 @@ TEST_CASE("nodal_mesh: binary files of Gmsh", "[io]") {
                           raw<double>({1, 0, 0}) + raw<std::int32_t>({5}) + raw<double>({0, 1, 0}) +
                           raw<std::int32_t>({4}) + raw<double>({0, 0, 1}) + "\n$EndNodes\n$Elements\n1\n" +
                           raw<std::int32_t>({4, 1, 2, 1, 6, 1, 9, 3, 5, 4}) + "\n$EndElements\n";
-  const NodalMesh mesh = read("a.msh", old);
+  const NodalMesh mesh = read_nodal_text("a.msh", old);
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{6});
   const std::string recent =
@@ -115,7 +98,7 @@ TEST_CASE("nodal_mesh: binary files of Gmsh", "[io]") {
       raw<double>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}) + "\n$EndNodes\n$Elements\n" +
       raw<std::uint64_t>({1, 1, 1, 1}) + raw<std::int32_t>({3, 1, 4}) + raw<std::uint64_t>({1, 2, 9, 3, 5, 4}) +
       "\n$EndElements\n";
-  const NodalMesh other = read("b.msh", recent);
+  const NodalMesh other = read_nodal_text("b.msh", recent);
   require_unit_tet(other);
   CHECK(other.references == std::vector<int>{7});
   for (std::size_t size = 0; size < recent.size(); size += 7)
@@ -177,7 +160,7 @@ std::string vtu(const Encoding& how) {
       content = encode(header(bytes.size()) + bytes);
     }
     if (!how.appended) return "<DataArray " + attributes + " format=\"binary\">\n " + content + "\n</DataArray>";
-    const std::string array =
+    std::string array =
         "<DataArray " + attributes + " format=\"appended\" offset=\"" + std::to_string(appended.size()) + "\"/>";
     appended += content;
     return array;
@@ -209,7 +192,7 @@ TEST_CASE("nodal_mesh: VTK XML in every encoding", "[io]") {
           if (!appended && !base64) continue;  // there are no raw data within XML
           CAPTURE(appended, base64, compressed, wide);
           const std::string text = vtu({appended, base64, compressed, wide});
-          const NodalMesh mesh = read("a.vtu", text);
+          const NodalMesh mesh = read_nodal_text("a.vtu", text);
           require_unit_tet(mesh);
           CHECK(mesh.references == std::vector<int>{12});
           for (std::size_t size = 0; size + 30 < text.size(); size += 13) nodal_refusal("b.vtu", text.substr(0, size));
@@ -238,7 +221,7 @@ TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files o
       "*Element, type=S4\n99, 1,2,3,4\n*Elset, elset=Upper\n20,\n"
       "*Solid Section, elset=upper, material=steel\n*Solid Section, elset=lower, material=wood\n,\n"
       "*Surface, name=bottom\n10, S1\n*Surface, name=\"side wall\", type=element\nboth, S4\n";
-  const NodalMesh mesh = read("a.inp", text);
+  const NodalMesh mesh = read_nodal_text("a.inp", text);
   REQUIRE(mesh.num_cells() == 2);
   CHECK(mesh.cell(1)[6] == 10);
   REQUIRE(mesh.references.size() == 2);
@@ -287,7 +270,7 @@ TEST_CASE("nodal_mesh: parts of Abaqus at several places, with the sets of each"
       "*Instance, name=w, part=wedge\n0., 5., 0.\n*End Instance\n"
       "*Nset, nset=held, instance=b-2\n1, 2, 5, 6\n*Nset, nset=one, instance=b-1\n1,\n"
       "*Surface, name=lids\nb-1.whole, S2\nb-2.1, S2\n*End Assembly\n";
-  const NodalMesh mesh = read("a.inp", text);
+  const NodalMesh mesh = read_nodal_text("a.inp", text);
   REQUIRE(mesh.num_cells() == 3);
   CHECK((mesh.positions[mesh.cell(1)[1]] - Vec3(3, 1, 0)).norm() < 1e-14);
   CHECK((mesh.positions[mesh.cell(1)[7]] - Vec3(2, 0, 1)).norm() < 1e-14);
@@ -314,21 +297,21 @@ TEST_CASE("nodal_mesh: numbers of a .inp have twenty characters at most, which i
   mesh.add_cell(CellKind::tet, std::vector<Index>{0, 1, 2, 3});
   const std::string text = inp_text(nodal_mesh(mesh));
   CHECK(text.find("1, -5.5283683253201e-06, 0, 0\n") != std::string::npos);
-  const NodalMesh back = read("b.inp", text);
+  const NodalMesh back = read_nodal_text("b.inp", text);
   for (std::size_t v = 0; v < 4; ++v) CHECK((back.positions[v] - mesh.positions[v]).norm() <= 1e-15);
 }
 
 TEST_CASE("nodal_mesh: groups and references come back from a .inp", "[io]") {
-  NodalMesh mesh = read("a.msh", kMsh41);
+  NodalMesh mesh = read_nodal_text("a.msh", kMsh41);
   mesh.references = {-4};
   mesh.regions = {{"solid part", -4, 3}};
-  const NodalMesh back = read("b.inp", inp_text(mesh));
+  const NodalMesh back = read_nodal_text("b.inp", inp_text(mesh));
   CHECK(back.references == mesh.references);
   CHECK(back.regions == std::vector<Group>{{"solid_part", -4, 3}});
   CHECK(back.face_groups.faces == mesh.face_groups.faces);
   CHECK(back.face_groups.groups[0].name == "inlet");
   CHECK(inp_text(mesh).find("*NSET, NSET=inlet\n1, 2, 3\n") != std::string::npos);
-  const NodalMesh mfem = read("b.mfem", mfem_text(mesh));
+  const NodalMesh mfem = read_nodal_text("b.mfem", mfem_text(mesh));
   CHECK(mfem.face_groups.faces.size() == 4);  // the boundary is listed whole
   CHECK(group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 2}) != group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 3}));
 }
@@ -337,13 +320,13 @@ TEST_CASE("Continuum shells are cells, and a .inp without parts may name instanc
   const std::string nodes = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n";
   const std::string set = "*NSET, NSET=base, INSTANCE=GONE-1, GENERATE\n1, 4, 1\n";
   for (const char* type : {"C3D8I", "SC8R", "CSS8", "EC3D8R"}) {
-    const NodalMesh mesh = read("a.inp", nodes + "*ELEMENT, TYPE=" + type + "\n1,1,2,3,4,5,6,7,8\n" + set);
+    const NodalMesh mesh = read_nodal_text("a.inp", nodes + "*ELEMENT, TYPE=" + type + "\n1,1,2,3,4,5,6,7,8\n" + set);
     REQUIRE(mesh.num_cells() == 1);
     REQUIRE(mesh.face_groups.groups.size() == 1);
     CHECK(mesh.face_groups.groups[0].name == "base");
     CHECK(mesh.face_groups.faces.size() == 1);
   }
-  const NodalMesh prism = read("a.inp", nodes + "*ELEMENT, TYPE=SC6R\n1,1,2,3,5,6,7\n");
+  const NodalMesh prism = read_nodal_text("a.inp", nodes + "*ELEMENT, TYPE=SC6R\n1,1,2,3,5,6,7\n");
   CHECK(prism.kinds[0] == CellKind::prism);
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*INCLUDE, INPUT=none.txt\n"),
              Contains("a.inp:10: ") && Contains("none.txt: no such file"));
@@ -357,66 +340,19 @@ TEST_CASE("A file without cells is refused with what it has instead", "[io][quic
     CHECK_THAT(nodal_refusal(name, pointer), Contains("git lfs pull"));
 }
 
-// --- Nastran --------------------------------------------------------------------------------------------------------
-
-TEST_CASE("nodal_mesh: small, large and free fields of Nastran, with its numbers", "[io]") {
-  const std::string text =
-      "SOL 101\nCEND\nBEGIN BULK\n"
-      "GRID           1              0.      0.      0.\n"
-      "GRID*                  2                            1.-0             0.\n*                      0.\n"
-      "GRID,3,0,0.,1.,0.\n"
-      "$ a comment\n"
-      "GRID,4,,0.,0.,\n"
-      "GRID           5              .5      0.    -1-1\n"
-      "CTETRA         1       3       1       2       3       4       5        +A\n"
-      "+A\n"
-      "PSOLID,3,1\nCQUAD4,9,4,1,2,3,4\nENDDATA\nrubbish\n";
-  std::string fixed = text;
-  fixed.replace(fixed.find("GRID,4,,0.,0.,"), 14, "GRID,4,,0.,0.,1.+0");
-  const NodalMesh mesh = read("a.bdf", fixed);
-  REQUIRE(mesh.num_cells() == 1);
-  CHECK(mesh.orders[0] == 2);
-  CHECK(mesh.references == std::vector<int>{3});
-  CHECK(mesh.face_groups.groups == std::vector<Group>{{"", 4, 2}});
-  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[4])] == Vec3(0.5, 0, -0.1));
-  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[5])] == Vec3(0.5, 0.5, 0));  // left out: straight
-  CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[3])] == Vec3(0, 0, 1));
-  CHECK_THAT(nodal_refusal("a.bdf", "BEGIN BULK\nGRID,1,5,0.,0.,0.\n"),
-             Contains("a.bdf:2:") && Contains("coordinate system"));
-  CHECK_THAT(nodal_refusal("a.bdf", "GRID,1,,0.,0.,x\n"), Contains("finite number"));
-  CHECK_THAT(nodal_refusal("a.bdf", "CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
-}
-
-TEST_CASE("Pyramids of Nastran have two names, and elements of unknown names are counted") {
-  std::string text = "BEGIN BULK\nCORD2R,1\n";
-  const Vec3 points[] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
-  for (int i = 0; i < 5; ++i)
-    text += "GRID," + std::to_string(i + 1) + ",," + std::to_string(points[i].x()) + "," +
-            std::to_string(points[i].y()) + "," + std::to_string(points[i].z()) + "\n";
-  for (const char* name : {"CPYRA", "CPYRAM"}) {
-    const NodalMesh mesh = read("a.bdf", text + name + ",1,1,1,2,3,4,5\nENDDATA\n");
-    REQUIRE(mesh.num_cells() == 1);
-    CHECK(mesh.warnings.empty());
-  }
-  const NodalMesh mesh = read("a.bdf", text + "CPYRA,1,1,1,2,3,4,5\nCTETRX,2,1,1,2,3,5\nENDDATA\n");
-  CHECK(mesh.num_cells() == 1);
-  REQUIRE(mesh.warnings.size() == 1);
-  CHECK_THAT(mesh.warnings[0], Contains("1 elements of type CTETRX"));
-}
-
 // --- MFEM -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
   const std::string head = "MFEM mesh v1.0\n\n# comment\ndimension\n3\n\nelements\n1\n4 4 0 1 2 3\n\nboundary\n1\n"
                            "6 2 0 2 1\n\nvertices\n4\n";
-  const NodalMesh mesh = read("a.mesh", head + "3\n" + kUnitTet);
+  const NodalMesh mesh = read_nodal_text("a.mesh", head + "3\n" + kUnitTet);
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{4});
   CHECK(mesh.face_groups.groups == std::vector<Group>{{"", 6, 2}});
   CHECK(read_volume_mesh(nodal_folder() / "a.mesh").num_cells() == 1);
   const std::string nodes = head + "\nnodes\nFiniteElementSpace\nFiniteElementCollection: H1_3D_P1\nVDim: 3\nOrdering: ";
-  require_unit_tet(read("b.mesh", nodes + "1\n" + kUnitTet));
-  require_unit_tet(read("b.mesh", nodes + "0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"));
+  require_unit_tet(read_nodal_text("b.mesh", nodes + "1\n" + kUnitTet));
+  require_unit_tet(read_nodal_text("b.mesh", nodes + "0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"));
   CHECK_THAT(nodal_refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM NURBS mesh v1.0\n"), Contains("NURBS"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n2\n"), Contains("dimension 3"));

@@ -93,7 +93,7 @@ class DirectSheets {
   }
   Vec3 edge_child(Index e) const {
     const auto [a, b] = topology_.edge(e);
-    const Vec3 middle = (mesh_.positions[a] + mesh_.positions[b]) / 2;
+    Vec3 middle = (mesh_.positions[a] + mesh_.positions[b]) / 2;
     if (sharp_.contains(e)) return middle;
     Vec3 centers = Vec3::Zero();
     for (const Index f : edge_faces_.at(e)) centers += face_child(f) / 4;
