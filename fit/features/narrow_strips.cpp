@@ -26,7 +26,7 @@ constexpr double kSpacing = 0.25;
 constexpr double kMostArea = 1.5;
 /// Range of the angles of one cell at the path and at the other border of a row, in degrees: those of `add_pads`, and
 /// somewhat more, for a cell that is a little poor is better than an edge that is lost.
-constexpr double kLeastCellAngle = 40, kMostCellAngle = 150;
+constexpr double kLeastRowAngle = 40, kMostRowAngle = 150;
 
 /// The regions on both sides of a curve, seen from outside along its direction.
 struct CurveSides {
@@ -304,7 +304,7 @@ class StripFollower {
     }
     const auto suits = [&](Index curve, std::span<const Index> vertices) {
       const double angle = features_.angles[curve] / rows.mean_cells(vertices);
-      return angle >= kLeastCellAngle && angle <= kMostCellAngle;
+      return angle >= kLeastRowAngle && angle <= kMostRowAngle;
     };
     if (!suits(placement.at_path, path.vertices) || !suits(placement.at_border, row->border)) return false;
     if (!take(placement, path, *row, rows, trial)) return false;

@@ -133,7 +133,8 @@ class InpMesh {
     const std::set<std::string> surfaces = names_of_surfaces();
     std::vector<std::size_t> wanted;
     for (std::size_t s = 0; s < content_.node_sets.size(); ++s)
-      if (content_.node_sets.is_defined(s) && !surfaces.contains(upper_case(content_.node_sets.name(s)))) wanted.push_back(s);
+      if (content_.node_sets.is_defined(s) && !surfaces.contains(upper_case(content_.node_sets.name(s))))
+        wanted.push_back(s);
     if (wanted.empty()) return;
     BoundaryOfNodes boundary(mesh_);
     for (const std::size_t s : wanted) {
@@ -194,7 +195,8 @@ class InpMesh {
     std::set<std::size_t> used = materials;
     std::map<std::size_t, std::vector<std::size_t>> sets_of_one;  // that hold nothing but the set
     for (std::size_t s = 0; s < content_.element_sets.size(); ++s)
-      if (const std::size_t other = content_.element_sets.only_other(s); other != kNone) sets_of_one[other].push_back(s);
+      if (const std::size_t other = content_.element_sets.only_other(s); other != kNone)
+        sets_of_one[other].push_back(s);
     mesh_.references.assign(content_.elements.size(), 0);
     int next = 1;
     for (const std::size_t s : materials) {
