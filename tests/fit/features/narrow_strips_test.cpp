@@ -44,7 +44,7 @@ Height height_of(const FeatureCurve& curve) {
   return a == 1 || b == 1 ? Height::between : Height::below;
 }
 
-Index vertex_at(const VolumeMesh& mesh, const Vec3& place) {
+Index cube_vertex_at(const VolumeMesh& mesh, const Vec3& place) {
   const auto at = std::ranges::find_if(mesh.positions, [&](const Vec3& p) { return (p - place).norm() < 1e-9; });
   REQUIRE(at != mesh.positions.end());
   return static_cast<Index>(at - mesh.positions.begin());
@@ -66,7 +66,7 @@ FeatureRouting cube_routing(const VolumeMesh& cube, const SignedFeatures& featur
     }
     const Vec3 from = corner_near(curve.points.front()), to = corner_near(curve.points.back());
     CreasePath path{static_cast<Index>(c), {}};
-    for (int i = 0; i <= 4; ++i) path.vertices.push_back(vertex_at(cube, from + 0.25 * i * (to - from)));
+    for (int i = 0; i <= 4; ++i) path.vertices.push_back(cube_vertex_at(cube, from + 0.25 * i * (to - from)));
     routing.corners.push_back({curve.vertices.front(), path.vertices.front()});
     routing.corners.push_back({curve.vertices.back(), path.vertices.back()});
     routing.paths.push_back(std::move(path));
