@@ -7,6 +7,7 @@
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace subvol::internal {
@@ -33,7 +34,8 @@ EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, cons
   PatchGroups groups =
       patch_groups(MeshTopology(grid), layout.patched.patches, near_target.positions, target, features);
   layout.pads = add_pads(layout.patched, features);
-  follow_narrow_strips(layout.patched, layout.routing, groups, target, features, lengths);
+  NarrowStrips strips = follow_narrow_strips(layout.patched, layout.routing, groups, target, features, lengths);
+  std::ranges::move(strips.pads, std::back_inserter(layout.pads.pads));
   layout.caps = quality_caps(layout.patched, features);
   layout.tagged_mesh = layout.patched.mesh;
   const std::vector<CreasePath> paths = paths_of_parts(layout.patched.paths, features.curves.curves.size());
@@ -62,7 +64,7 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   while (true) {
     EdgeLayout layout =
         layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), lengths);
-    // Those that no strip follows get their parts back.
+    // Curves that no strip follows are followed in parts again.
     const auto is_lost = [&](Index c) {
       return std::ranges::find(layout.routing.unfollowed, c, &UnfollowedCurve::curve) !=
              layout.routing.unfollowed.end();

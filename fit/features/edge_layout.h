@@ -19,7 +19,7 @@ namespace subvol::internal {
 struct EdgeLayout {
   FeatureRouting routing;
   PatchedMesh patched;                ///< its mesh is the one to fit, from its positions; without tags
-  PadReport pads;
+  PadReport pads;                     ///< those of narrow strips are the last
   QualityCaps caps;
   FollowedCreases creases;            ///< of the patched mesh
   std::vector<CreaseSegment> segments;  ///< edges of the paths, and the curves of `creases` that they follow
@@ -30,8 +30,9 @@ struct EdgeLayout {
   VolumeMesh tagged_mesh;
 };
 
-/// Routes the features (`route_features`), divides the boundary (`patched_mesh`), pads it (`add_pads`), and prepares what
-/// a fit needs.
+/// Routes the features (`route_features`), divides the boundary (`patched_mesh`), pads it (`add_pads`), follows curves
+/// that are closer to others than a cell (`follow_narrow_strips`), and prepares what a fit needs. A curve that could be
+/// followed like that as a whole loses its parts; if it is lost then, all but the routing is done again with them.
 ///
 /// grid     hexes; passes `validate` except for unused vertices.
 /// fitted   positions of its vertices near the target.

@@ -485,13 +485,10 @@ FeatureRouting without_parts(FeatureRouting routing, std::span<const Index> curv
 }
 
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
-  double all = 0, routed = 0;
+  double all = 0, lost = 0;
   for (const FeatureCurve& curve : curves.curves) all += curve.length();
-  for (const CreasePath& path : routing.paths)
-    if (!std::ranges::binary_search(routing.parts, path.curve, {}, &FollowedPart::curve))
-      routed += curves.curves[path.curve].length();
-  for (const FollowedPart& part : routing.parts) routed += part.to - part.from;
-  return all > 0 ? routed / all : 1;
+  for (const UnfollowedCurve& curve : routing.unfollowed) lost += curve.length;
+  return all > 0 ? 1 - lost / all : 1;
 }
 
 }  // namespace subvol::internal

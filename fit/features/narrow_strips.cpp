@@ -4,7 +4,6 @@
 #include "subvol/fit/features/patch_fans.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_geometry.h"
-#include "subvol/surface/welded_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -18,36 +17,17 @@ namespace subvol::internal {
 
 namespace {
 
-/// Largest distance between the curves of a strip, in units of h: cells as wide fit between farther ones.
+/// Largest distance between the curves of a strip, in units of h. Between curves farther apart, there is a row of the
+/// grid.
 constexpr double kMostWidth = 0.95;
 /// Spacing of the samples at which it is measured, in units of h.
 constexpr double kSpacing = 0.25;
-/// A region is a strip if its area is at most so many times that between its curves.
+/// Largest area of the region of a strip, in units of its curves' mean length times their mean distance: elsewhere the
+/// two curves run beside each other by chance.
 constexpr double kMostArea = 1.5;
-/// Range of the angles of one cell at the path and at the other border of a row, in degrees: those of `add_pads`, and
-/// somewhat more, for a cell that is a little poor is better than an edge that is lost.
+/// Range of the angles that a cell may have at both borders of a row, in degrees. It is somewhat wider than that of
+/// `add_pads`, since a poor cell is better than a lost edge.
 constexpr double kLeastRowAngle = 40, kMostRowAngle = 150;
-
-/// The regions on both sides of a curve, seen from outside along its direction.
-struct CurveSides {
-  Index left = kNoIndex, right = kNoIndex;
-  bool has(Index region) const { return left == region || right == region; }
-};
-
-std::vector<CurveSides> sides_of_curves(const TriangleMesh& target, const SignedFeatures& features) {
-  const std::vector<SurfaceHalfEdge> half_edges = sorted_half_edges(target.triangles, target.positions.size());
-  const auto ends = [](const SurfaceHalfEdge& side) { return std::array{side.low, side.high}; };
-  std::vector<CurveSides> sides;
-  for (const FeatureCurve& curve : features.curves.curves) {
-    const Index v = curve.vertices[0], w = curve.vertices[1];
-    CurveSides found;
-    for (auto at = std::ranges::lower_bound(half_edges, std::array{std::min(v, w), std::max(v, w)}, {}, ends);
-         at != half_edges.end() && ends(*at) == std::array{std::min(v, w), std::max(v, w)}; ++at)
-      (at->forward == (v < w) ? found.left : found.right) = features.regions[at->triangle];
-    sides.push_back(found);
-  }
-  return sides;
-}
 
 std::vector<double> areas_of_regions(const TriangleMesh& target, const SignedFeatures& features) {
   std::vector<double> areas(features.num_regions, 0.0);
@@ -60,7 +40,7 @@ std::vector<double> areas_of_regions(const TriangleMesh& target, const SignedFea
 struct Strip {
   Index lost, followed, region;
   double width;  ///< largest distance of one of the curves from the other
-  double area;   ///< length times mean distance
+  double area;   ///< mean length of the curves times their mean distance
   bool same_direction;
 };
 
@@ -175,10 +155,7 @@ class StripFinder {
       : features_(features),
         curves_(features.curves.curves),
         lengths_(lengths),
-        sides_(sides_of_curves(target, features)),
         areas_(areas_of_regions(target, features)) {}
-
-  const CurveSides& sides(Index curve) const { return sides_[curve]; }
 
   /// Returns the narrow strips between curves that are lost and others that are followed, the narrowest first.
   std::vector<Strip> strips(const FeatureRouting& routing) const {
@@ -212,8 +189,9 @@ class StripFinder {
   std::optional<Strip> strip_between(Index lost, Index followed) const {
     const FeatureCurve &c = curves_[lost], &n = curves_[followed];
     Index region = kNoIndex;
-    for (const Index r : {sides_[lost].left, sides_[lost].right})
-      if (r != kNoIndex && sides_[followed].has(r) && (region == kNoIndex || areas_[r] < areas_[region])) region = r;
+    for (const Index r : {features_.sides[lost].left, features_.sides[lost].right})
+      if (r != kNoIndex && features_.sides[followed].has(r) && (region == kNoIndex || areas_[r] < areas_[region]))
+        region = r;
     if (region == kNoIndex || c.closed() != n.closed()) return std::nullopt;
     const double h = lengths_[lost];
     const Beside of_lost = beside(c, n, kSpacing * h);
@@ -231,7 +209,6 @@ class StripFinder {
   const SignedFeatures& features_;
   const std::vector<FeatureCurve>& curves_;
   std::span<const double> lengths_;
-  std::vector<CurveSides> sides_;
   std::vector<double> areas_;
 };
 
@@ -247,11 +224,10 @@ class StripFollower {
         curves_(features.curves.curves),
         finder_(finder) {}
 
-  std::size_t run() {
-    std::size_t count = 0;
+  NarrowStrips run() {
     for (const Strip& strip : finder_.strips(routing_))
-      if (is_lost(routing_, strip.lost) && !is_in_parts(routing_, strip.lost) && follow(strip)) ++count;
-    return count;
+      if (is_lost(routing_, strip.lost) && !is_in_parts(routing_, strip.lost) && follow(strip)) ++result_.num_followed;
+    return std::move(result_);
   }
 
  private:
@@ -273,42 +249,38 @@ class StripFollower {
   bool follow(const Strip& strip) {
     const auto path = std::ranges::find(patched_.paths, strip.followed, &CreasePath::curve);
     if (path == patched_.paths.end()) return false;
-    const bool region_left = finder_.sides(strip.followed).left == strip.region;
+    const bool region_left = features_.sides[strip.followed].left == strip.region;
     std::array<Placement, 2> placements{Placement{strip, strip.followed, strip.lost, region_left},
                                         Placement{strip, strip.lost, strip.followed, !region_left}};
-    const double cells = Rows(patched_).mean_cells(path->vertices);
+    const Rows rows(patched_);
+    const double cells = rows.mean_cells(path->vertices);
     const auto fault = [&](const Placement& p) {
       return std::max(std::abs(features_.angles[p.at_path] - 90),
                       std::abs(features_.angles[p.at_border] / (cells + 1) - 90));
     };
     std::ranges::stable_sort(placements, {}, fault);
-    return follow(placements[0]) || follow(placements[1]);
+    return follow(placements[0], rows) || follow(placements[1], rows);
   }
 
-  bool follow(const Placement& placement) {
-    PatchedMesh trial = patched_;
-    CreasePath path = path_of_followed(placement, trial);
-    Rows rows(trial);
-    auto row = rows.row_beside(path.vertices, placement.row_left);
-    if (!row || !is_free(placement, path, *row, rows, trial)) {
-      const auto patches_of = [&](bool left) {
-        std::set<Index> patches;
-        for (const Index f : rows.faces_beside(path.vertices, left)) patches.insert(trial.patches.of_face[f]);
-        return std::vector<Index>(patches.begin(), patches.end());
-      };
-      if (!pad_beside(trial, features_, patches_of(!placement.row_left), patches_of(placement.row_left))) return false;
-      rows = Rows(trial);
-      path = path_of_followed(placement, trial);
-      row = rows.row_beside(path.vertices, placement.row_left);
-      if (!row || !is_free(placement, path, *row, rows, trial)) return false;
-    }
-    const auto suits = [&](Index curve, std::span<const Index> vertices) {
-      const double angle = features_.angles[curve] / rows.mean_cells(vertices);
-      return angle >= kLeastRowAngle && angle <= kMostRowAngle;
+  /// Uses the row that is there, or makes one by a pad. rows: of the mesh as it is.
+  bool follow(const Placement& placement, const Rows& rows) {
+    const CreasePath path = path_of_followed(placement, patched_);
+    if (const auto row = free_row(placement, path, rows, patched_)) return enter(placement, path, *row, rows, patched_);
+    const auto patches_of = [&](bool left) {
+      std::set<Index> patches;
+      for (const Index f : rows.faces_beside(path.vertices, left)) patches.insert(patched_.patches.of_face[f]);
+      return std::vector<Index>(patches.begin(), patches.end());
     };
-    if (!suits(placement.at_path, path.vertices) || !suits(placement.at_border, row->border)) return false;
-    if (!take(placement, path, *row, rows, trial)) return false;
-    patched_ = std::move(trial);
+    PatchedMesh padded = patched_;
+    std::optional<Pad> pad =
+        pad_without(padded, features_, patches_of(!placement.row_left), patches_of(placement.row_left));
+    if (!pad) return false;
+    const Rows padded_rows(padded);
+    const CreasePath moved = path_of_followed(placement, padded);
+    const auto row = free_row(placement, moved, padded_rows, padded);
+    if (!row || !enter(placement, moved, *row, padded_rows, padded)) return false;
+    patched_ = std::move(padded);
+    result_.pads.push_back(*std::move(pad));
     return true;
   }
 
@@ -323,6 +295,13 @@ class StripFollower {
     };
     return {front ? path.vertices.front() : path.vertices.back(), front ? row.border.front() : row.border.back(),
             corner(placement.at_path), corner(placement.at_border)};
+  }
+
+  /// Returns the row for a placement if it is one that no path runs into.
+  std::optional<Row> free_row(const Placement& placement, const CreasePath& path, const Rows& rows,
+                              const PatchedMesh& patched) const {
+    std::optional<Row> row = rows.row_beside(path.vertices, placement.row_left);
+    return row && is_free(placement, path, *row, rows, patched) ? std::move(row) : std::nullopt;
   }
 
   /// Returns true if no path runs into the row or along its other border, except at its ends.
@@ -349,6 +328,7 @@ class StripFollower {
       const auto placed = std::ranges::find(patched.corners, corner, &PlacedCorner::corner);
       return placed == patched.corners.end() ? kNoIndex : placed->vertex;
     };
+    if (end.corner_at_path == end.corner_at_border) return false;  // the strip tapers to a point
     const Index of_path = vertex_of(end.corner_at_path), of_border = vertex_of(end.corner_at_border);
     if (of_path != kNoIndex && of_path != end.v) return false;
     if (of_border == end.w) return true;  // where a strip that ended there before has put it
@@ -368,20 +348,27 @@ class StripFollower {
             curves_[path.curve].vertices.back() == end.corner_at_border);
   }
 
-  /// Enters a strip into the trial, the routing and the groups. Returns false if a patch would lose its last face.
-  bool take(const Placement& placement, const CreasePath& path, const Row& row, const Rows& rows, PatchedMesh& trial) {
-    std::vector<std::size_t> left(trial.patches.count, 0);
-    for (const Index p : trial.patches.of_face) ++left[p];
+  /// Enters a strip into the mesh, the routing and the groups. Returns false, and changes nothing, if its angles do not
+  /// suit or a patch would lose its last face.
+  bool enter(const Placement& placement, const CreasePath& path, const Row& row, const Rows& rows,
+             PatchedMesh& patched) {
+    const auto suits = [&](Index curve, std::span<const Index> vertices) {
+      const double angle = features_.angles[curve] / rows.mean_cells(vertices);
+      return angle >= kLeastRowAngle && angle <= kMostRowAngle;
+    };
+    if (!suits(placement.at_path, path.vertices) || !suits(placement.at_border, row.border)) return false;
+    std::vector<std::size_t> left(patched.patches.count, 0);
+    for (const Index p : patched.patches.of_face) ++left[p];
     for (const Index f : row.faces)
-      if (--left[trial.patches.of_face[f]] == 0) return false;
+      if (--left[patched.patches.of_face[f]] == 0) return false;
     enter_group(placement.strip.region);
-    for (const Index f : row.faces) trial.patches.of_face[f] = static_cast<Index>(trial.patches.count);
-    ++trial.patches.count;
-    if (!trial.rules.empty()) trial.rules.push_back(PadRule::never);
-    if (!trial.shared.empty()) trial.shared.push_back(0);
+    for (const Index f : row.faces) patched.patches.of_face[f] = static_cast<Index>(patched.patches.count);
+    ++patched.patches.count;
+    if (!patched.rules.empty()) patched.rules.push_back(PadRule::never);
+    if (!patched.shared.empty()) patched.shared.push_back(0);
     if (path.vertices.front() != path.vertices.back())
-      for (const bool front : {true, false}) finish_end(end_of(placement, path, row, front), rows, trial);
-    enter_paths(placement, path, row, trial);
+      for (const bool front : {true, false}) finish_end(end_of(placement, path, row, front), rows, patched);
+    enter_paths(placement, path, row, patched);
     return true;
   }
 
@@ -394,34 +381,34 @@ class StripFollower {
   }
 
   /// Places the corners of an end, and cuts a path back that runs along it; the curve between the corners follows it.
-  void finish_end(const End& end, const Rows& rows, PatchedMesh& trial) {
+  void finish_end(const End& end, const Rows& rows, PatchedMesh& patched) {
     const Index beside = rows.path_at(end.v, end.w);
-    std::vector<PlacedCorner>& corners = trial.corners;
+    std::vector<PlacedCorner>& corners = patched.corners;
     std::erase(corners, PlacedCorner{end.corner_at_border, end.v});
     for (const PlacedCorner& corner :
          {PlacedCorner{end.corner_at_path, end.v}, PlacedCorner{end.corner_at_border, end.w}})
       if (std::ranges::find(corners, corner) == corners.end()) corners.push_back(corner);
     std::ranges::sort(corners, {}, [](const PlacedCorner& p) { return std::pair(p.vertex, p.corner); });
-    if (beside == kNoIndex || !can_be_cut_back(trial.paths[beside], end)) return;
-    std::vector<Index>& vertices = trial.paths[beside].vertices;
+    if (beside == kNoIndex || !can_be_cut_back(patched.paths[beside], end)) return;
+    std::vector<Index>& vertices = patched.paths[beside].vertices;
     vertices.erase(vertices.front() == end.v ? vertices.begin() : vertices.end() - 1);
     const auto between = std::ranges::find_if(routing_.unfollowed, [&](const UnfollowedCurve& lost) {
       return lost.reason == NotFollowed::shorter_than_cell && joins_corners(curves_[lost.curve], end);
     });
     if (between == routing_.unfollowed.end()) return;
     const bool from_path = curves_[between->curve].vertices.front() == end.corner_at_path;
-    trial.paths.push_back({between->curve, from_path ? std::vector{end.v, end.w} : std::vector{end.w, end.v}});
+    patched.paths.push_back({between->curve, from_path ? std::vector{end.v, end.w} : std::vector{end.w, end.v}});
     routing_.unfollowed.erase(between);
   }
 
-  void enter_paths(const Placement& placement, const CreasePath& path, const Row& row, PatchedMesh& trial) {
+  void enter_paths(const Placement& placement, const CreasePath& path, const Row& row, PatchedMesh& patched) {
     const Strip& strip = placement.strip;
     const bool on_lost = placement.at_path == strip.lost;
-    path_of_followed(placement, trial).vertices = on_lost ? row.border : path.vertices;
+    path_of_followed(placement, patched).vertices = on_lost ? row.border : path.vertices;
     std::vector<Index> of_lost = on_lost ? path.vertices : row.border;
     if (!strip.same_direction) std::ranges::reverse(of_lost);
-    trial.paths.push_back({strip.lost, std::move(of_lost)});
-    std::ranges::stable_sort(trial.paths, {}, &CreasePath::curve);
+    patched.paths.push_back({strip.lost, std::move(of_lost)});
+    std::ranges::stable_sort(patched.paths, {}, &CreasePath::curve);
     std::erase_if(routing_.unfollowed, [&](const UnfollowedCurve& lost) { return lost.curve == strip.lost; });
   }
 
@@ -431,6 +418,7 @@ class StripFollower {
   const SignedFeatures& features_;
   const std::vector<FeatureCurve>& curves_;
   const StripFinder& finder_;
+  NarrowStrips result_;
 };
 
 }  // namespace
@@ -446,10 +434,10 @@ std::vector<Index> strips_in_parts(const FeatureRouting& routing, const Triangle
   return curves;
 }
 
-std::size_t follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
-                                 const TriangleMesh& target, const SignedFeatures& features,
-                                 std::span<const double> lengths) {
-  if (routing.unfollowed.empty() || routing.paths.empty()) return 0;
+NarrowStrips follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
+                                  const TriangleMesh& target, const SignedFeatures& features,
+                                  std::span<const double> lengths) {
+  if (routing.unfollowed.empty() || routing.paths.empty()) return {};
   const StripFinder finder(target, features, lengths);
   return StripFollower(patched, routing, groups, features, finder).run();
 }

@@ -13,34 +13,44 @@
 
 namespace subvol::internal {
 
+struct NarrowStrips {
+  std::size_t num_followed = 0;  ///< number of curves that are followed now
+  std::vector<Pad> pads;         ///< those that were made for them, in their order
+};
+
 /// Follows curves that run beside a followed one, closer to it than a cell, as those of a chamfer or a small step do.
-/// No path of the grid is left for them; the side of a pad is one:
+/// No path of the grid is left for them, but the side of a pad is one:
 ///
-///        A   N       B                   A   N   B
-///        ----o---o---o           ----o---o           N: followed curve, whose path separates A and B
-///            |   |   |               |   |           C: lost curve; R: strip of the target between the two
-///            o---o---o   ->      ----o---o C
-///            |   |   |               |   | \         .
-///                                    o---o---o---o   the pad lies under A; its side is the strip
+///              A                             A
+///        o---o---o N                   o---o---o N      The curve N has a path, which separates the patches A and B.
+///        |   |   |                     o---o---o C      A pad under A has a side, a row of faces between N and C. It
+///        o---o---o  B        ->        |   |   |        is the strip, and its lower border follows the lost curve C.
+///        |   |   |                     o---o---o  B
+///        o---o---o                     |   |   |
 ///
-/// The row of faces beside the path that the side of the pad makes becomes a patch of the strip, and the path along its
-/// other border follows the lost curve. If a pad under B suits the angles better, the path of N follows C, and the
-/// other border N. A pad that is there already serves as well.
+/// If a pad under B suits the angles better, the path of N follows C, and the border of its side follows N. A row that
+/// is there already serves as well.
 ///
-/// A curve C is followed like this if no path follows any part of it, it is at least h long (`edge_lengths_near`), the
-/// distances of each of the two curves from the other are at most 0.95 h, and the region between them is narrow. Closed
-/// curves must have no corner. At an open one's end, the row's end may lie on the path of a curve that ends at C's
-/// corner there, which is cut back to that corner; the short curve between the corners of N and C follows the end then.
+/// A curve C is followed like this if
+///   - no path follows any part of it, and it is at least h long (`edge_lengths_near`);
+///   - each of the two curves is at most 0.95 h away from the other all along, and both are open or both are closed;
+///   - the region between them has at most 1.5 times the area of a strip of their mean length and distance;
+///   - it has no corner if it is closed, and no corner in common with N if it is open: such a strip tapers to a point;
+///   - no path runs into the row, and the cells at both curves get angles between 40 and 150 degrees.
+///
+/// At the end of an open strip, the path of a curve that ends at C's corner may run along the end of the row. It is cut
+/// back to the border of the row, and a curve between the corners of N and C that is shorter than a cell follows the
+/// end.
 ///
 /// patched   from `patched_mesh` and `add_pads`. Its positions may gain vertices, as by `pad`.
 /// routing   in: that of `patched`. out: curves that are followed now are no longer among `unfollowed`.
 /// groups    in: those of `patched`. out: with the new patches.
 /// lengths   h near each curve, for curves in `unfollowed`; one entry per curve.
-/// returns   the number of curves that are followed now. Deterministic, serial. Cost: a few passes over the mesh per
-///           curve.
-std::size_t follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
-                                 const TriangleMesh& target, const SignedFeatures& features,
-                                 std::span<const double> lengths);
+/// features  from `signed_features`.  target  that of `features`.
+/// Deterministic, serial. InputError: as `add_pads`. Cost: a few passes over the mesh per curve.
+NarrowStrips follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
+                                  const TriangleMesh& target, const SignedFeatures& features,
+                                  std::span<const double> lengths);
 
 /// Returns the curves that paths follow in parts, and that run beside a followed curve so that `follow_narrow_strips`
 /// may follow them as a whole if the parts are left out; ascending.

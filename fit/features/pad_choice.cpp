@@ -184,14 +184,15 @@ class PadChoice {
     return std::move(report_);
   }
 
-  /// Puts a single pad under some patches and those that it needs. Returns false if that is not possible.
-  bool run_on(std::span<const Index> patches) {
+  /// Puts a single pad under some patches and those that it needs. Returns nothing if that is not possible.
+  std::optional<Pad> run_on(std::span<const Index> patches) {
     unite_over_flat_paths();
     for (const auto& [a, b] : patched_.united) sets_.unite(a, b);
     const PadScores scores(patched_, features_, sets_, reach_);
     std::vector<std::uint8_t> is_padded(patched_.patches.count, 0);
     for (const Index p : patches) add_set(sets_.of(p), is_padded);
-    return !has_never(is_padded) && !grow_until_allowed(scores, is_padded) && !make(is_padded);
+    if (has_never(is_padded) || grow_until_allowed(scores, is_padded) || make(is_padded)) return std::nullopt;
+    return report_.pads.back();
   }
 
   /// Puts a single pad under all patches. Returns nothing if that is not possible.
@@ -333,12 +334,12 @@ PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
   return *std::move(report_of_all);
 }
 
-bool pad_beside(PatchedMesh& patched, const SignedFeatures& features, std::span<const Index> patches,
-                std::span<const Index> never) {
+std::optional<Pad> pad_without(PatchedMesh& patched, const SignedFeatures& features, std::span<const Index> patches,
+                               std::span<const Index> never) {
   std::vector<PadRule> rules = patched.rules;
   if (rules.empty()) patched.rules.assign(patched.patches.count, PadRule::free);
   for (const Index p : never) patched.rules[p] = PadRule::never;
-  const bool made = PadChoice(patched, features).run_on(patches);
+  std::optional<Pad> made = PadChoice(patched, features).run_on(patches);
   patched.rules = std::move(rules);
   return made;
 }

@@ -144,8 +144,8 @@ PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features);
 /// `add_pads` adds them.
 ///
 /// never    patches that the pad may not lie under.
-/// returns  false if there is no such pad; the mesh is unchanged then. InputError: as `pad`.
-bool pad_beside(PatchedMesh& patched, const SignedFeatures& features, std::span<const Index> patches,
-                std::span<const Index> never);
+/// returns  the pad; nothing if there is none, and the mesh is unchanged then. InputError: as `pad`.
+std::optional<Pad> pad_without(PatchedMesh& patched, const SignedFeatures& features, std::span<const Index> patches,
+                               std::span<const Index> never);
 
 }  // namespace subvol::internal

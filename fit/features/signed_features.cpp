@@ -78,6 +78,16 @@ void find_regions(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sid
   features.num_regions = sets.number(features.regions);
 }
 
+/// Both regions are the same all along a curve, which ends where others meet it.
+CurveSides sides_of(const FeatureCurve& curve, std::span<const SurfaceHalfEdge> sides, std::span<const Index> regions) {
+  CurveSides result;
+  for (const SurfaceHalfEdge& side : sides_at(sides, curve.vertices[0], curve.vertices[1])) {
+    const bool runs_along = side.forward == (curve.vertices[0] < curve.vertices[1]);
+    (runs_along ? result.left : result.right) = regions[side.triangle];
+  }
+  return result;
+}
+
 /// Length-weighted mean; the plain one if all segments are points.
 double mean_of(const FeatureCurve& curve, std::span<const double> angles) {
   double sum = 0, length = 0, plain = 0;
@@ -102,6 +112,8 @@ SignedFeatures signed_features(const TriangleMesh& target, FeatureCurves curves)
     features.angles.push_back(mean_of(curve, features.segment_angles.back()));
   }
   find_regions(target, sides, features);
+  for (const FeatureCurve& curve : features.curves.curves)
+    features.sides.push_back(sides_of(curve, sides, features.regions));
   return features;
 }
 

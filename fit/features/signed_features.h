@@ -9,6 +9,12 @@
 
 namespace subvol::internal {
 
+/// The regions on both sides of a curve, seen from outside along its direction.
+struct CurveSides {
+  Index left = kNoIndex, right = kNoIndex;
+  bool has(Index region) const { return left == region || right == region; }
+};
+
 /// The sharp edges of a solid with the angles of the solid along them, and the parts of the surface between them.
 struct SignedFeatures {
   FeatureCurves curves;
@@ -18,6 +24,7 @@ struct SignedFeatures {
   std::vector<double> angles;  ///< mean of each curve over its length
   std::vector<Index> regions;  ///< region of each triangle: triangles connected without crossing a curve
   std::size_t num_regions = 0;
+  std::vector<CurveSides> sides;  ///< of each curve
 
   bool is_convex(Index curve) const { return angles[curve] < 180; }
 };

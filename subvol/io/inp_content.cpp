@@ -17,7 +17,7 @@ namespace subvol::internal {
 
 namespace {
 
-/// Makes the mesh of what a file holds.
+/// Makes a mesh from the content of a file.
 class InpMesh {
  public:
   explicit InpMesh(InpContent& content) : content_(content), cells_(mesh_) {}

@@ -26,7 +26,8 @@ struct InpType {
   int order;
 };
 
-/// What an Abaqus or CalculiX file holds, by its own numbers: nodes and elements may come after what names them.
+/// The content of an Abaqus or CalculiX file. Nodes and elements keep the numbers that they have in the file, because a
+/// line may name one that comes later.
 struct InpContent {
   struct Element {
     const InpType* type;

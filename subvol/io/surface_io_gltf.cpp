@@ -4,6 +4,7 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/face_labels.h"
 #include "subvol/io/left_out.h"
+#include "subvol/io/scene_nodes.h"
 #include "subvol/io/surface_formats.h"
 #include "subvol/io/triangle_welder.h"
 
@@ -25,7 +26,6 @@ using Transform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
 /// Throws InputError if values of JSON are in one another so deep that recursion, as that of tinygltf, would take more
 /// than the stack.
 void require_shallow_json(const std::string& name, std::string_view json) {
-  constexpr int kMostDepth = 500;
   int depth = 0;
   bool in_text = false;
   for (std::size_t i = 0; i < json.size(); ++i) {
@@ -38,7 +38,8 @@ void require_shallow_json(const std::string& name, std::string_view json) {
       ++depth;
     else if (c == ']' || c == '}')
       --depth;
-    if (depth > kMostDepth) throw InputError(name + ": values nested more than 500 deep");
+    if (depth > kMostSceneDepth)
+      throw InputError(name + ": values nested more than " + std::to_string(kMostSceneDepth) + " deep");
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the verb check tells about meshes, curved meshes and surfaces.
+// Tests what `check` says of meshes, curved meshes and surfaces.
 
 #include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"

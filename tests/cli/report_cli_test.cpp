@@ -33,7 +33,7 @@ subvol::VolumeMesh inverted_tet_and_cube() {
   return mesh;
 }
 
-/// What `check` finds in a file.
+/// Returns what `check` finds in a file.
 nlohmann::json found_in(const Workplace& place, const std::string& file) {
   return nlohmann::json::parse(place.run("check " + file + " --json").out);
 }

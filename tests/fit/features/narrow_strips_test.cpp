@@ -35,13 +35,26 @@ TriangleMesh chamfered_cube() {
   return mesh;
 }
 
-enum class Height { below, at_chamfer, at_top, between };
+/// The same cube with a chamfer along one edge of its top that starts with no width at (-1, -1, 1).
+TriangleMesh cube_with_taper() {
+  TriangleMesh mesh;
+  mesh.positions = {{-1, -1, -1},          {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},         {-1, -1, 1},
+                    {1, -1, 1 - kChamfer}, {1, 1, 1},   {-1, 1, 1}, {1, kChamfer - 1, 1}};
+  mesh.triangles = {{3, 2, 1}, {3, 1, 0}, {0, 1, 5}, {0, 5, 4}, {4, 5, 8}, {4, 8, 6}, {4, 6, 7},
+                    {1, 2, 6}, {1, 6, 8}, {1, 8, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+  return mesh;
+}
 
-Height height_of(const FeatureCurve& curve) {
-  const double a = curve.points.front().z(), b = curve.points.back().z();
-  if (a == 1 && b == 1) return Height::at_top;
-  if (a == 1 - kChamfer && b == 1 - kChamfer) return Height::at_chamfer;
-  return a == 1 || b == 1 ? Height::between : Height::below;
+/// Says which curves have no path.
+using IsLost = bool (*)(const FeatureCurve&);
+
+bool is_at_top(const FeatureCurve& curve) { return curve.points.front().z() == 1 && curve.points.back().z() == 1; }
+bool is_at_chamfer(const FeatureCurve& curve) {
+  return curve.points.front().z() == 1 - kChamfer && curve.points.back().z() == 1 - kChamfer;
+}
+bool is_below_taper(const FeatureCurve& curve) {
+  return std::min(curve.points.front().z(), curve.points.back().z()) == 1 - kChamfer && curve.length() > 1 &&
+         std::max(curve.points.front().z(), curve.points.back().z()) == 1;
 }
 
 Index cube_vertex_at(const VolumeMesh& mesh, const Vec3& place) {
@@ -50,17 +63,16 @@ Index cube_vertex_at(const VolumeMesh& mesh, const Vec3& place) {
   return static_cast<Index>(at - mesh.positions.begin());
 }
 
-/// Paths along all edges of a cube of cells, except that those of one height are lost, and those between both.
-FeatureRouting cube_routing(const VolumeMesh& cube, const SignedFeatures& features, Height lost) {
+/// Paths along the edges of a cube of cells, except for curves that are lost or shorter than a cell.
+FeatureRouting cube_routing(const VolumeMesh& cube, const SignedFeatures& features, IsLost is_lost) {
   const auto corner_near = [](const Vec3& p) {
     return Vec3(p.x() < 0 ? -1 : 1, p.y() < 0 ? -1 : 1, p.z() < 0 ? -1 : 1);
   };
   FeatureRouting routing;
   for (std::size_t c = 0; c < features.curves.curves.size(); ++c) {
     const FeatureCurve& curve = features.curves.curves[c];
-    const Height height = height_of(curve);
-    if (height == lost || height == Height::between) {
-      const auto reason = height == lost ? NotFollowed::lost_to_neighbor : NotFollowed::shorter_than_cell;
+    if (is_lost(curve) || curve.length() < 0.5) {
+      const auto reason = is_lost(curve) ? NotFollowed::lost_to_neighbor : NotFollowed::shorter_than_cell;
       routing.unfollowed.push_back({static_cast<Index>(c), reason, curve.points[0], curve.points, curve.length()});
       continue;
     }
@@ -79,7 +91,7 @@ FeatureRouting cube_routing(const VolumeMesh& cube, const SignedFeatures& featur
 }  // namespace
 
 TEST_CASE("narrow strips: a chamfer narrower than a cell gets a row of faces of its own, whichever edge was found") {
-  const Height lost = GENERATE(Height::at_top, Height::at_chamfer);
+  const IsLost lost = GENERATE(as<IsLost>(), is_at_top, is_at_chamfer);
   const TriangleMesh target = chamfered_cube();
   const SignedFeatures features = features_of(target);
   REQUIRE(features.curves.curves.size() == 20);
@@ -91,7 +103,12 @@ TEST_CASE("narrow strips: a chamfer narrower than a cell gets a row of faces of 
   const std::size_t patches = patched.patches.count;
   const std::vector<double> lengths(features.curves.curves.size(), 0.5);
 
-  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths) == 4);
+  const std::size_t cells = patched.mesh.num_cells();
+  const NarrowStrips strips = follow_narrow_strips(patched, routing, groups, target, features, lengths);
+  CHECK(strips.num_followed == 4);
+  REQUIRE(strips.pads.size() == 1);
+  CHECK(patched.mesh.num_cells() == cells + strips.pads[0].cells);
+  CHECK(routed_share(routing, features.curves) == 1);
   CHECK(routing.unfollowed.empty());
   CHECK(validate(patched.mesh).empty());
   CHECK(patched.patches.count == patches + 4);
@@ -130,12 +147,20 @@ TEST_CASE("narrow strips: a chamfer narrower than a cell gets a row of faces of 
   }
 }
 
-TEST_CASE("narrow strips: curves farther apart than a cell, and those that were excluded, are left alone") {
-  const TriangleMesh target = chamfered_cube();
+TEST_CASE(
+    "narrow strips: curves farther apart than a cell, or excluded, or with a corner in common with the other are left "
+    "alone") {
+  TriangleMesh target = chamfered_cube();
+  double length = 0.5;
+  IsLost is_lost = is_at_top;
+  SECTION("the two curves meet, so that the strip tapers to a point") {
+    target = cube_with_taper();
+    is_lost = is_below_taper;
+  }
   const SignedFeatures features = features_of(target);
   const VolumeMesh cube = centered_lattice(4);
-  FeatureRouting routing = cube_routing(cube, features, Height::at_top);
-  double length = 0.5;
+  FeatureRouting routing = cube_routing(cube, features, is_lost);
+  REQUIRE(routing.unfollowed.size() >= 2);
   SECTION("cells much smaller than the chamfer") { length = 0.2 * kChamfer; }
   SECTION("excluded") {
     for (UnfollowedCurve& lost : routing.unfollowed) lost.reason = NotFollowed::excluded;
@@ -144,7 +169,7 @@ TEST_CASE("narrow strips: curves farther apart than a cell, and those that were 
   PatchGroups groups = patch_groups(MeshTopology(cube), patched.patches, cube.positions, target, features);
   const std::size_t cells = patched.mesh.num_cells(), unfollowed = routing.unfollowed.size();
   const std::vector<double> lengths(features.curves.curves.size(), length);
-  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths) == 0);
+  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths).num_followed == 0);
   CHECK(patched.mesh.num_cells() == cells);
   CHECK(routing.unfollowed.size() == unfollowed);
 }

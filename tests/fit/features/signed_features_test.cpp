@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/features/signed_features.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "tests/support/feature_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -25,6 +26,23 @@ TEST_CASE("a cube has twelve convex edges of 90 degrees between six regions") {
   CHECK(features.num_regions == 6);
   REQUIRE(features.regions.size() == 6 * 18);
   for (std::size_t t = 0; t < features.regions.size(); ++t) CHECK(features.regions[t] == static_cast<Index>(t / 18));
+}
+
+TEST_CASE("the regions beside a curve are those on its left and right, as seen from outside") {
+  const TriangleMesh target = cube_surface(3, false);
+  const SignedFeatures features = features_of(target);
+  REQUIRE(features.sides.size() == 12);
+  for (std::size_t c = 0; c < 12; ++c) {
+    const auto normal = [&](Index region) {
+      return triangle_normal(
+          target, static_cast<Index>(std::ranges::find(features.regions, region) - features.regions.begin()));
+    };
+    const auto& [left, right] = features.sides[c];
+    const std::vector<Vec3>& points = features.curves.curves[c].points;
+    CHECK(normal(left).cross(normal(right)).isApprox((points[1] - points[0]).normalized()));
+    CHECK(features.sides[c].has(left));
+    CHECK(!features.sides[c].has(kNoIndex));
+  }
 }
 
 TEST_CASE("an L has one reflex edge, whatever the order of the triangles' corners") {
