@@ -140,6 +140,7 @@ class ContactImprint {
   std::size_t num_tests_ = 0;
   std::vector<std::vector<Index>> clusters_;
   std::vector<Index> vertices_;                                ///< of clusters, ascending
+  std::vector<Index> crossings_;                               ///< vertices at which edges of clusters cross
   std::map<std::array<Index, 2>, std::vector<Index>> inside_;  ///< vertices inside an edge, from its lower number on
 };
 
@@ -271,12 +272,18 @@ bool ContactImprint::replace(const std::vector<Index>& cluster, std::vector<Piec
       const auto crossing = crossing_of(edges[i], edges[j], x, y);
       if (!crossing) continue;
       const Vec3 p = lifted((*crossing)[0], (*crossing)[1]);
-      num_tests_ += vertices.size();
+      num_tests_ += vertices.size() + crossings_.size();
       if (num_tests_ > kMostTests) return false;
       const auto is_near = [&](Index v) { return (mesh_.positions[v] - p).norm() <= distance_; };
       if (std::ranges::any_of(vertices, is_near)) continue;
-      vertices.push_back(static_cast<Index>(mesh_.positions.size()));
-      mesh_.positions.push_back(p);
+      const auto known = std::ranges::find_if(crossings_, is_near);  // of another cluster with both edges
+      if (known == crossings_.end()) {
+        vertices.push_back(static_cast<Index>(mesh_.positions.size()));
+        crossings_.push_back(vertices.back());
+        mesh_.positions.push_back(p);
+      } else {
+        vertices.push_back(*known);
+      }
     }
   Overlay overlay;
   std::map<Index, Overlay::Vertex_handle> handles;
