@@ -110,7 +110,7 @@ void tell_check(const CheckArguments& arguments, const std::vector<std::string>&
 }
 
 /// Returns the regions of a surface, if it has several.
-std::optional<RegionSurface> regions_of(const TriangleMesh& surface) {
+std::optional<RegionSurface> regions_of_surface(const TriangleMesh& surface) {
   if (std::optional<internal::TouchingSolids> solids = internal::touching_solids(surface, interrupted))
     return std::move(solids->regions);
   return find_regions(surface);
@@ -132,7 +132,7 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
   json.update(diagnosis_json(diagnosis));
   std::string text = to_text(diagnosis);
   if (!diagnosis.is_cancelled && diagnosis.parts.size() > 1)
-    if (const std::optional<RegionSurface> regions = regions_of(surface.mesh)) {
+    if (const std::optional<RegionSurface> regions = regions_of_surface(surface.mesh)) {
       // A sheet between two regions counts for none in the sum over the triangles.
       diagnosis.volume = std::accumulate(regions->volumes.begin(), regions->volumes.end(), 0.0);
       json["volume"] = diagnosis.volume;
