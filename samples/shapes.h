@@ -37,6 +37,12 @@ PolygonMesh bowl_surface(int n = 12);
 /// top; outward.
 PolygonMesh plate_surface();
 
+/// An assembly of four solids that touch, each with its name: a block on a sheet of cork on a plate, with a pin on top.
+///
+/// In millimeters: plate 60 x 60 x 10, cork and block 40 x 40 x 20, pin of 24 sides with radius 8 and height 20; the
+/// plate's lower side is at z = 0. Quads; each solid is closed and outward.
+PolygonMesh mount_surface();
+
 /// A connecting rod with two bores: 2.8 long, 0.3 thick. Quads with the groups small_bore, large_bore, side, bottom and
 /// top; all edges between them are sharp; outward.
 PolygonMesh rod_surface();

@@ -122,6 +122,39 @@ PolygonMesh rod_surface() {
   return rod.take();
 }
 
+PolygonMesh mount_surface() {
+  constexpr int kPinSides = 24;
+  constexpr double kPinRadius = 8, kPinBottom = 50, kPinTop = 70;
+  QuadBuilder mount({{"plate", 1}, {"cork", 2}, {"block", 3}, {"pin", 4}});
+  const auto add_box = [&](const char* name, double half, double bottom, double top) {
+    const auto corner = [&](int k, double z) {  // counterclockwise
+      return mount.vertex({k % 4 == 1 || k % 4 == 2 ? half : -half, k % 4 >= 2 ? half : -half, z});
+    };
+    const auto across = [&](double z) {
+      return std::array<Index, 4>{corner(0, z), corner(1, z), corner(2, z), corner(3, z)};
+    };
+    mount.add_both(name, across(bottom), name, across(top));
+    for (int k = 0; k < 4; ++k)
+      mount.add(name, {corner(k, bottom), corner(k + 1, bottom), corner(k + 1, top), corner(k, top)});
+  };
+  add_box("plate", 30, 0, 10);
+  add_box("cork", 20, 10, 30);
+  add_box("block", 20, 30, 50);
+  const auto at = [&](int side, double z) {
+    const double angle = kTau * (side % kPinSides) / kPinSides;
+    return mount.vertex({kPinRadius * std::cos(angle), kPinRadius * std::sin(angle), z});
+  };
+  for (int k = 0; k < kPinSides; ++k) {
+    mount.add("pin", {at(k, kPinBottom), at(k + 1, kPinBottom), at(k + 1, kPinTop), at(k, kPinTop)});
+    if (k % 2 != 0) continue;
+    const auto two_sectors = [&](double z) {
+      return std::array<Index, 4>{mount.vertex({0, 0, z}), at(k, z), at(k + 1, z), at(k + 2, z)};
+    };
+    mount.add_both("pin", two_sectors(kPinBottom), "pin", two_sectors(kPinTop));
+  }
+  return mount.take();
+}
+
 PolygonMesh bowl_surface(int n) {
   // A cube's surface without its upper side, blown up to a ball.
   PolygonMesh mesh;

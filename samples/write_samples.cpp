@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, bowl.obj to grow shells on, rod.obj,
-// starfish.off and plate.obj to fill and to compute on, and tangled.mesh to repair.
+// starfish.off, plate.obj and mount.stl to fill and to compute on, and tangled.mesh to repair.
 
+#include <subvol/export/obj_writer.h>
+#include <subvol/export/surface_writer.h>
+#include <subvol/io/mesh_io.h>
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
-#include <subvol/export/obj_writer.h>
-#include <subvol/io/mesh_io.h>
 
 #include <cstdio>
 #include <exception>
@@ -34,6 +35,7 @@ int main(int argc, char** argv) try {
   subvol::write_file_atomically(folder / "starfish.off",
                                 subvol::samples::off_text(subvol::samples::starfish_surface()));
   subvol::write_obj(folder / "plate.obj", subvol::samples::plate_surface());
+  subvol::write_surface(folder / "mount.stl", subvol::samples::mount_surface());
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "subvol_samples: %s\n", error.what());

@@ -8,6 +8,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/target/surface_wrap.h"
+#include "subvol/fit/target/touching_solids.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
@@ -105,6 +106,18 @@ SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, st
   return result;
 }
 
+/// Repairs named solids that touch along triangles of which the reader drops the copies; nothing if the surface is
+/// another one. Warnings of the reader from `told` on are replaced.
+std::optional<SurfaceRepair> repaired_with_copies(const std::filesystem::path& path, RegionRule rule, std::size_t told,
+                                                  std::vector<std::string>& warnings) {
+  std::vector<std::string> own_warnings;
+  const TriangleMesh surface = triangulate(read_polygon_mesh(path, &own_warnings));
+  if (!touching_solids(surface, interrupted, rule)) return std::nullopt;
+  warnings.resize(told);
+  warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
+  return repair_surface(surface, interrupted, rule);
+}
+
 /// Repairs a surface with the copies of triangles that the reader drops, if these tell more: two that face each other
 /// are a sheet between two regions, or walls of zero width where solids touch.
 ///
@@ -156,8 +169,10 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
   if (!is_label_grid_file(path)) {
     const std::size_t told = warnings.size();
     const TriangleMesh read = load_surface(path, warnings);
-    SurfaceRepair repair = repair_surface(read, interrupted, rule);
     const bool may_have_copies = warnings.size() > told && is_surface_file(path);
+    if (may_have_copies && !read.face_groups.empty())
+      if (std::optional<SurfaceRepair> repair = repaired_with_copies(path, rule, told, warnings)) return *repair;
+    SurfaceRepair repair = repair_surface(read, interrupted, rule);
     if (may_have_copies) consider_copies(path, rule, read.triangles.size(), told, repair, warnings);
     return repair;
   }
@@ -294,7 +309,7 @@ void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& w
   if (!surface) return;
   SurfaceRepair repair = repair_surface(*surface, interrupted, rule);
   add_remarks(repair, warnings);
-  if (!repair.regions) *surface = std::move(repair.surface);
+  *surface = std::move(repair.surface);
 }
 
 void add_remarks(const SurfaceRepair& repair, std::vector<std::string>& warnings) {

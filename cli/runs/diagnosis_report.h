@@ -33,7 +33,7 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
                            std::vector<std::string>& warnings);
 
 /// Repairs a surface for which a template is to be made (`repair_surface`), and adds what was done to warnings. Other
-/// targets, and surfaces of several regions, are left as they are. An interrupt ends the repair.
+/// targets are left as they are. An interrupt ends the repair.
 void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& warnings);
 
 /// Return the numbers, names and volumes of a surface's regions, as text and as an entry of a report.

@@ -15,6 +15,7 @@
 #include "subvol/base/process_memory.h"
 #include "subvol/base/version.h"
 #include "subvol/export/curved_file.h"
+#include "subvol/fit/target/touching_solids.h"
 #include "subvol/io/surface_io.h"
 
 #include <iostream>
@@ -56,7 +57,7 @@ Checked check_linear(const CheckArguments& arguments, const VolumeMesh& mesh, co
   Checked checked{against(outer, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
-  if (target && checked.check.quality) checked.groups = compare_groups(*target, mesh);
+  if (outer && checked.check.quality) checked.groups = compare_groups(*outer, mesh);
   return checked;
 }
 
@@ -108,6 +109,13 @@ void tell_check(const CheckArguments& arguments, const std::vector<std::string>&
   else if (!arguments.run.quiet) print(text);
 }
 
+/// Returns the regions of a surface, if it has several.
+std::optional<RegionSurface> regions_of_surface(const TriangleMesh& surface) {
+  if (std::optional<internal::TouchingSolids> solids = internal::touching_solids(surface, interrupted))
+    return std::move(solids->regions);
+  return find_regions(surface);
+}
+
 /// Says what is in the way of filling a surface.
 int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, const CLI::App& verb,
                   const std::vector<std::string>& warnings) {
@@ -124,7 +132,7 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
   json.update(diagnosis_json(diagnosis));
   std::string text = to_text(diagnosis);
   if (!diagnosis.is_cancelled && diagnosis.parts.size() > 1)
-    if (const std::optional<RegionSurface> regions = find_regions(surface.mesh)) {
+    if (const std::optional<RegionSurface> regions = regions_of_surface(surface.mesh)) {
       // A sheet between two regions counts for none in the sum over the triangles.
       diagnosis.volume = std::accumulate(regions->volumes.begin(), regions->volumes.end(), 0.0);
       json["volume"] = diagnosis.volume;

@@ -87,9 +87,10 @@ CLI::Option* add_references_option(CLI::App& verb, RunOptions& options) {
 void add_regions_option(CLI::App& verb, std::string& rule) {
   verb.add_option(
           "--regions", rule,
-          "What becomes of closed parts inside others and of sheets inside a solid. auto (default): sheets make\n"
-          "regions, and so do parts inside others, unless they face inward as walls of voids do; keep: whatever\n"
-          "is enclosed is a region; merge: one region, parts inside others are the walls of voids")
+          "What becomes of solids that touch, of closed parts inside others and of sheets inside a solid. auto\n"
+          "(default): solids that have names and touch are regions, sheets make regions, and so do parts inside\n"
+          "others, unless they face inward as walls of voids do; keep: whatever is enclosed is a region; merge:\n"
+          "one region, solids that touch are united, parts inside others are the walls of voids")
       ->check(CLI::IsMember({"auto", "keep", "merge"}))
       ->type_name("auto|keep|merge");
 }

@@ -8,18 +8,24 @@
 
 namespace subvol::internal {
 
-/// Makes triangles that overlap in one plane agree: they are cut along each other's edges, and one of each pair of
-/// equal ones is left. So solids that touch, with faces that are cut into other triangles, get an interface in common.
+/// Triangles no farther apart than this share of the diagonal touch. Files in single precision or with six digits hold
+/// planes of assemblies to a tenth of it, and no cell fits into such a gap.
+inline constexpr double kTouchingShare = 1e-5;
+
+/// Makes triangles that lie on each other agree: they are cut along each other's edges. So solids that touch, with
+/// faces that are cut into other triangles, get equal triangles there: one for each solid.
 ///
-/// Triangles that overlap form clusters in a plane. The edges of a cluster are the constraints of a Delaunay
-/// triangulation there, whose triangles replace those of the cluster; triangles beside it are cut where its vertices
-/// lie on their edges.
+/// Triangles lie on each other if they overlap, seen along the normal of the larger one, and are within
+/// `kTouchingShare` of its plane there. They form clusters, whose vertices become one, or lie on edges, if they are
+/// that near. The edges of a cluster are the constraints of a Delaunay triangulation in its plane, whose triangles
+/// replace those of the cluster; triangles beside it are cut where its vertices lie on their edges.
 ///
 /// surface    finite, with valid vertex numbers.
 /// cancelled  asked now and then, from the calling thread; if it returns true, nothing is returned. Empty: never.
-/// returns    the welded surface, whose shape is that of the given one up to rounding, with its groups. Nothing if no
-///            triangles overlap, if some cross, or if there are too many.
-/// Cost: that of `self_intersections`, and the square of the triangles in a cluster.
+/// returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`. Nothing
+///            if no triangles lie on each other but those that have the same corners, or if there are too many. What
+///            crosses is not looked at: the result may cross as the surface does.
+/// Cost: that of the pairs of triangles whose boxes meet, and the square of the triangles in a cluster.
 std::optional<TriangleMesh> imprinted_contacts(const TriangleMesh& surface,
                                                const std::function<bool()>& cancelled = {});
 

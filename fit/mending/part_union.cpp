@@ -23,9 +23,20 @@ PartUnion::PartUnion(SurfaceParts parts, const std::function<bool()>& cancelled)
   for (std::size_t t = 0; t < parts_.part.size(); ++t) triangles_of_[parts_.part[t]].push_back(static_cast<Index>(t));
 }
 
+std::string PartUnion::name_of(std::size_t p) const {
+  const FaceGroups& groups = mesh().face_groups;
+  if (groups.empty()) return "";
+  const Index first = groups.of_face[triangles_of_[p].front()];
+  const auto is_same = [&](Index t) { return groups.of_face[t] == first; };
+  return first != kNoIndex && std::ranges::all_of(triangles_of_[p], is_same) ? groups.groups[first].name : "";
+}
+
 std::string PartUnion::text_of(const Meeting& meeting) const {
-  return "parts " + std::to_string(meeting.a) + " and " + std::to_string(meeting.b) + " meet at " +
-         to_text(meeting.place);
+  const auto text = [&](std::size_t p) {
+    const std::string name = name_of(p);
+    return std::to_string(p) + (name.empty() ? "" : " (" + name + ")");
+  };
+  return "parts " + text(meeting.a) + " and " + text(meeting.b) + " meet at " + to_text(meeting.place);
 }
 
 bool PartUnion::group() {
@@ -101,8 +112,12 @@ std::optional<TriangleMesh> PartUnion::made(std::vector<std::string>& done) {
     result.positions.insert(result.positions.end(), one->positions.begin(), one->positions.end());
     for (const auto& [a, b, c] : one->triangles) result.triangles.push_back({first + a, first + b, first + c});
     if (is_alone) continue;
+    const bool have_names = std::ranges::any_of(meetings[p], [&](const Meeting& meeting) {
+      return !name_of(meeting.a).empty() && !name_of(meeting.b).empty() && name_of(meeting.a) != name_of(meeting.b);
+    });
     done.push_back("target: " + text_of(meetings[p].front()) + "; " + std::to_string(members[p].size()) +
-                   " parts that cross or overlap are united");
+                   " parts that cross or overlap are united" +
+                   (have_names ? " (named solids are regions only if they touch and do not cross)" : ""));
   }
   return result;
 }

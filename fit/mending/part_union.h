@@ -38,6 +38,8 @@ class PartUnion {
   /// members  parts, ascending.  meetings: those among them.
   std::optional<TriangleMesh> united_group(std::span<const std::size_t> members,
                                            std::span<const Meeting> meetings) const;
+  /// Returns the name of the group that a part's triangles are in; empty if there is none, or there are several.
+  std::string name_of(std::size_t p) const;
   std::string text_of(const Meeting& meeting) const;
 
   SurfaceParts parts_;

@@ -12,8 +12,10 @@
 #include "subvol/fit/mending/solid_wrap.h"
 #include "subvol/fit/mending/tidy_surface.h"
 #include "subvol/fit/target/carried_groups.h"
+#include "subvol/fit/target/touching_solids.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/surface_parts.h"
+#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/auto_template.h"
 
 #include <Eigen/Geometry>
@@ -237,14 +239,27 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
 }
 
+/// Returns the repair of named solids that touch; nothing if the surface is another one.
+std::optional<SurfaceRepair> repaired_solids(const TriangleMesh& given, const std::function<bool()>& cancelled,
+                                             RegionRule rule) {
+  std::optional<TouchingSolids> solids = touching_solids(given, cancelled, rule);
+  if (!solids) return std::nullopt;
+  SurfaceRepair repair{.surface = std::move(solids->surface), .is_fillable = true};
+  repair.done.push_back("target: " + solids->text());
+  for (const std::string& note : solids->regions.notes) repair.notes.push_back("target: " + note);
+  repair.regions = std::move(solids->regions);
+  return repair;
+}
+
 /// Returns the surface with contacts of faces that are cut into equal triangles, if sheets or parts make regions and
 /// nothing else is in the way of telling them apart.
 std::optional<TriangleMesh> with_common_contacts(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
                                                  const std::function<bool()>& cancelled, RegionRule rule) {
-  if (!diagnosis.find(SurfaceFault::face_contact) || diagnosis.find(SurfaceFault::crossing)) return std::nullopt;
+  if (!diagnosis.find(SurfaceFault::face_contact) && !diagnosis.find(SurfaceFault::crossing)) return std::nullopt;
   if (!diagnosis.find(SurfaceFault::interface) && rule != RegionRule::keep) return std::nullopt;
   std::optional<TriangleMesh> common = imprinted_contacts(given, cancelled);
   if (!common) return std::nullopt;
+  drop_copies(*common);
   const SurfaceDiagnosis after = diagnose(*common, cancelled);
   const bool is_clear = !after.is_cancelled && !after.find(SurfaceFault::face_contact) &&
                         !after.find(SurfaceFault::crossing) && num_obstacles(after) < num_obstacles(diagnosis);
@@ -253,6 +268,7 @@ std::optional<TriangleMesh> with_common_contacts(const TriangleMesh& given, cons
 
 /// `repair_surface`, whose result counts only if it was not cancelled.
 SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  if (std::optional<SurfaceRepair> repair = repaired_solids(given, cancelled, rule)) return std::move(*repair);
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
   if (rule != RegionRule::keep && diagnosis.find(SurfaceFault::face_contact))
@@ -265,9 +281,10 @@ SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& c
     }
   if (const std::optional<TriangleMesh> common = with_common_contacts(given, diagnosis, cancelled, rule)) {
     SurfaceRepair repair = repaired(*common, cancelled, rule);
-    const SurfaceFinding& contacts = *diagnosis.find(SurfaceFault::face_contact);
+    const SurfaceFinding* contacts = diagnosis.find(SurfaceFault::face_contact);
+    if (!contacts) contacts = diagnosis.find(SurfaceFault::crossing);
     repair.done.insert(repair.done.begin(),
-                       "target: " + to_text(contacts, diagnosis.diagonal) + "; they are cut along each other's edges");
+                       "target: " + to_text(*contacts, diagnosis.diagonal) + "; they are cut along each other's edges");
     return repair;
   }
   if (std::optional<TidySurface> tidy = tidy_surface(given, diagnosis)) {

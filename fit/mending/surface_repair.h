@@ -31,12 +31,13 @@ struct SurfaceRepair {
 /// First, repeated triangles are dropped, triangles that disagree with their part are turned, and triangles are cut
 /// where vertices of others lie on their open edges (`tidy_surface`).
 ///
-/// Faces that touch but are cut into other triangles are cut along each other's edges (`imprinted_contacts`) if sheets
-/// divide the inside, or if RegionRule::keep is given: the solids that touch there become regions.
+/// Faces that touch but are cut into other triangles are cut along each other's edges (`imprinted_contacts`) if they
+/// are those of named solids (`touching_solids`), if sheets divide the inside, or if RegionRule::keep is given: the
+/// solids that touch there become regions. The triangles where named solids touch are there for each of them.
 ///
-/// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
-/// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
-/// points inward beside others that do not. A solid part in a void stays a part of its own.
+/// Other closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a
+/// void, its inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a
+/// part that points inward beside others that do not. A solid part in a void stays a part of its own.
 ///
 /// Crossings, contacts of faces, repeated triangles and edges of three triangles that remain are mended if that is
 /// possible within `kMendingShare` of the diagonal (`mend_surface`) and leaves fewer places that prevent filling.

@@ -2,6 +2,7 @@
 #include "subvol/fit/target/region_matching.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/fit/target/touching_solids.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
@@ -22,6 +23,8 @@ namespace {
 /// Returns so many regions of a target, if that is the number that a rule finds. Whatever the mesh fills is no void, so
 /// closed parts that face inward may be regions, too.
 std::optional<RegionSurface> find_so_many_regions(const TriangleMesh& target, std::size_t count) {
+  if (std::optional<TouchingSolids> solids = touching_solids(target); solids && solids->regions.regions.size() == count)
+    return std::move(solids->regions);
   for (const RegionRule rule : {RegionRule::automatic, RegionRule::keep})
     if (std::optional<RegionSurface> regions = find_regions(target, rule); regions && regions->regions.size() == count)
       return regions;
@@ -99,7 +102,8 @@ MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& templ
     matched.outer = outer_surface(*matched.regions);
     return matched;
   }
-  const std::optional<RegionSurface> others = find_regions(target);
+  std::optional<TouchingSolids> solids = touching_solids(target);
+  const std::optional<RegionSurface> others = solids ? std::optional(std::move(solids->regions)) : find_regions(target);
   if (!others || has_cavity(template_mesh)) return matched;
   matched.outer = outer_surface(*others);
   const std::size_t count = std::max<std::size_t>(1, region_references(template_mesh).size());

@@ -12,9 +12,9 @@ namespace subvol::internal {
 
 /// Returns the regions of a target, numbered as the regions of a mesh in which they lie.
 ///
-/// The target has the regions that `find_regions` finds, with voids as regions (`RegionRule::keep`) if only then there
-/// are as many as in the mesh. Regions of the mesh and the target belong to each other one to one: those in which the
-/// most centers of cells are come first, by winding numbers.
+/// The target has the regions of `touching_solids`, or those that `find_regions` finds, with voids as regions
+/// (`RegionRule::keep`) if only then there are as many as in the mesh. Regions of the mesh and the target belong to
+/// each other one to one: those in which the most centers of cells are come first, by winding numbers.
 ///
 /// returns  nothing if the mesh has one region or the target has another number of them; if a region of the mesh is in
 ///          none of the target that is left for it; or if other pairs of regions have an interface.

@@ -5,6 +5,7 @@
 #include "subvol/base/format.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/named_solids.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 #include "subvol/surface/winding_number.h"
@@ -32,33 +33,29 @@ std::size_t place_of(const RegionSurface& surface, int region) {
   return static_cast<std::size_t>(at - surface.regions.begin());
 }
 
-/// Drops all but the first of triangles with the same corners. Returns 1 for those kept of which there were several.
-std::vector<char> drop_copies(TriangleMesh& mesh) {
-  std::vector<std::pair<std::array<Index, 3>, Index>> keys;
+/// The named solids behind each triangle and in front of it, as places in the list of groups, or kNoIndex.
+using SolidSides = std::vector<std::array<Index, 2>>;
+
+/// Returns the named solids on the sides of triangles without copies; nothing if there are no named solids, or if two
+/// of them are on the same side of a triangle.
+/// mesh  welded, with copies.  kept, kept_as: its triangles without them, and what has become of each.
+std::optional<SolidSides> solids_at_sides(const TriangleMesh& mesh, std::span<const std::array<Index, 3>> kept,
+                                          std::span<const Index> kept_as) {
+  const std::vector<double> volumes = volumes_of_named_solids(mesh);
+  if (volumes.empty()) return std::nullopt;
+  const auto turned_to_least = [](std::array<Index, 3> t) {
+    std::rotate(t.begin(), std::ranges::min_element(t), t.end());
+    return t;
+  };
+  SolidSides solids(kept.size(), {kNoIndex, kNoIndex});
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    auto key = mesh.triangles[t];
-    std::sort(key.begin(), key.end());
-    keys.push_back({key, static_cast<Index>(t)});
+    const Index group = mesh.face_groups.of_face[t];
+    const bool is_turned = turned_to_least(mesh.triangles[t]) != turned_to_least(kept[kept_as[t]]);
+    Index& solid = solids[kept_as[t]][is_turned != (volumes[group] < 0) ? 1 : 0];
+    if (solid != kNoIndex && solid != group) return std::nullopt;
+    solid = group;
   }
-  std::sort(keys.begin(), keys.end());
-  std::vector<char> is_copy(mesh.triangles.size(), 0);
-  std::vector<char> has_copy(mesh.triangles.size(), 0);
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    is_copy[keys[i].second] = keys[i].first == keys[i - 1].first;
-    if (is_copy[keys[i].second]) has_copy[keys[i - 1].second] = 1;
-  }
-  std::size_t kept = 0;
-  for (std::size_t t = 0; t < is_copy.size(); ++t) {
-    if (is_copy[t]) continue;
-    mesh.triangles[kept] = mesh.triangles[t];
-    has_copy[kept] = has_copy[t];
-    if (!mesh.face_groups.empty()) mesh.face_groups.of_face[kept] = mesh.face_groups.of_face[t];
-    ++kept;
-  }
-  mesh.triangles.resize(kept);
-  if (!mesh.face_groups.empty()) mesh.face_groups.of_face.resize(kept);
-  has_copy.resize(kept);
-  return has_copy;
+  return solids;
 }
 
 /// The triangles at an edge in the order of their angles around it, and for each whether its front faces the next.
@@ -80,9 +77,10 @@ EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 /// front.
 class RegionFinder {
  public:
-  RegionFinder(TriangleMesh mesh, std::vector<char> has_copy, RegionRule rule)
+  RegionFinder(TriangleMesh mesh, std::vector<char> has_copy, std::optional<SolidSides> solids, RegionRule rule)
       : mesh_(std::move(mesh)),
         has_copy_(std::move(has_copy)),
+        solids_(std::move(solids)),
         rule_(rule),
         cells_(2 * mesh_.triangles.size()),
         parts_(mesh_.triangles.size()) {}
@@ -93,6 +91,7 @@ class RegionFinder {
     if (parts_with_cells_.size() == 1 && is_manifold(0)) return std::nullopt;
     place_parts();
     number_regions();
+    take_solids();
     return result();
   }
 
@@ -268,6 +267,47 @@ class RegionFinder {
     }
   }
 
+  /// Makes one region of all that lies in one named solid, and none of what lies in no solid, unless everything that is
+  /// enclosed is to be a region. Does nothing if regions are other than the solids, or if no two solids touch.
+  void take_solids() {
+    if (!solids_) return;
+    constexpr Index kUnknown = kNoIndex - 1;
+    std::vector<Index> solid_of(static_cast<std::size_t>(num_regions_) + 1, kUnknown);
+    const auto solid_at = [&](std::size_t side) { return (*solids_)[side / 2][side % 2]; };
+    for (std::size_t side = 0; side < region_of_side_.size(); ++side) {
+      Index& solid = solid_of[region_of_side_[side]];
+      if (region_of_side_[side] == kOutside) continue;
+      if (solid != kUnknown && solid != solid_at(side)) return;
+      solid = solid_at(side);
+    }
+    solid_of[kOutside] = kNoIndex;
+    const auto touches = [&](std::size_t t) {
+      const Index behind = solid_of[region_of_side_[2 * t]], front = solid_of[region_of_side_[2 * t + 1]];
+      return behind != front && behind != kNoIndex && front != kNoIndex;
+    };
+    std::size_t t = 0;
+    while (t < mesh_.triangles.size() && !touches(t)) ++t;
+    if (t == mesh_.triangles.size()) return;
+    std::vector<int> number(solid_of.size(), kOutside);
+    std::map<Index, int> number_of_solid;
+    num_regions_ = 0;
+    for (std::size_t r = 1; r < solid_of.size(); ++r) {  // they are numbered by their first sides
+      const Index solid = solid_of[r];
+      if (solid == kNoIndex) {
+        if (rule_ != RegionRule::keep) continue;
+        number[r] = ++num_regions_;
+      } else {
+        const auto [it, is_new] = number_of_solid.try_emplace(solid, num_regions_ + 1);
+        num_regions_ += is_new;
+        number[r] = it->second;
+      }
+    }
+    for (int& region : region_of_side_) region = number[region];
+    names_.assign(static_cast<std::size_t>(num_regions_) + 1, "");
+    for (const auto& [solid, region] : number_of_solid) names_[region] = mesh_.face_groups.groups[solid].name;
+    nested_ = 0;
+  }
+
   std::optional<RegionSurface> result() {
     RegionSurface surface;
     surface.mesh.positions = mesh_.positions;
@@ -277,7 +317,7 @@ class RegionFinder {
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       const std::array<int, 2> sides{region_of_side_[2 * t], region_of_side_[2 * t + 1]};
       if (sides[0] == sides[1]) {  // a membrane in one region, or outside
-        ++loose;
+        loose += names_.empty();
         continue;
       }
       has_interface = has_interface || (sides[0] != kOutside && sides[1] != kOutside);
@@ -286,9 +326,9 @@ class RegionFinder {
       if (!mesh_.face_groups.empty()) surface.mesh.face_groups.of_face.push_back(mesh_.face_groups.of_face[t]);
     }
     if (!has_interface) return std::nullopt;
-    for (int r = 1; r <= num_regions_; ++r) surface.regions.push_back({"", r, 3});
+    for (int r = 1; r <= num_regions_; ++r) surface.regions.push_back({names_.empty() ? "" : names_[r], r, 3});
     orient_sheets(surface);
-    name_regions(surface);
+    if (names_.empty()) name_regions(surface);
     if (nested_ > 0)
       surface.notes.push_back(
           formatted("%zu closed part%s not face inward though inside another, and bound%s a region; "
@@ -331,6 +371,7 @@ class RegionFinder {
 
   TriangleMesh mesh_;
   std::vector<char> has_copy_;
+  std::optional<SolidSides> solids_;
   RegionRule rule_;
   DisjointSets cells_, parts_;
   std::vector<Index> curve_triangles_;
@@ -338,6 +379,7 @@ class RegionFinder {
   std::vector<Part> parts_with_cells_;
   std::vector<int> region_of_side_;
   int num_regions_ = 0;
+  std::vector<std::string> names_;  ///< of the regions, by number, if these are named solids; else empty
   std::size_t nested_ = 0;  ///< parts that are regions though they might be voids
 };
 
@@ -392,9 +434,15 @@ const char* to_string(RegionRule rule) {
 
 std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule) {
   if (rule == RegionRule::merge) return std::nullopt;
-  TriangleMesh mesh = welded(surface).mesh;
-  std::vector<char> has_copy = drop_copies(mesh);
-  return RegionFinder(std::move(mesh), std::move(has_copy), rule).run();
+  const TriangleMesh whole = welded(surface).mesh;
+  TriangleMesh mesh = whole;
+  const std::vector<Index> kept_as = drop_copies(mesh);
+  std::vector<std::size_t> num_copies(mesh.triangles.size(), 0);
+  for (const Index t : kept_as) ++num_copies[t];
+  std::vector<char> has_copy;
+  for (const std::size_t count : num_copies) has_copy.push_back(count > 1);
+  std::optional<SolidSides> solids = solids_at_sides(whole, mesh.triangles, kept_as);
+  return RegionFinder(std::move(mesh), std::move(has_copy), std::move(solids), rule).run();
 }
 
 void orient_sheets(RegionSurface& surface) {

@@ -55,8 +55,12 @@ const char* to_string(RegionRule rule);
 /// region otherwise: if it faces outward, if its triangles disagree about the outside, or if each of them is there
 /// twice, for the solids on either side.
 ///
-/// Regions are numbered from 1 on by their first triangles. A region gets the name of a group of triangles if they all
-/// bound it, and are half or more of its boundary by area.
+/// Named solids (`volumes_of_named_solids`) that touch along triangles with the same corners, one of each solid, are
+/// the regions, if none of them overlaps another: each in one piece or in several. What they enclose together without
+/// filling it is then a void, unless RegionRule::keep is given.
+///
+/// Regions are numbered from 1 on by their first triangles. Other regions get the name of a group of triangles if these
+/// all bound it, and are half or more of its boundary by area.
 ///
 /// surface  orientation does not matter but for the rule above.
 /// returns  nothing if there are no two regions that share a triangle; if an edge has only one triangle; or if at an

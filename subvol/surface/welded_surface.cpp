@@ -110,6 +110,34 @@ WeldedSurface welded(const TriangleMesh& surface) {
   return result;
 }
 
+std::vector<Index> drop_copies(TriangleMesh& mesh) {
+  std::vector<std::pair<std::array<Index, 3>, Index>> keys;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    auto key = mesh.triangles[t];
+    std::sort(key.begin(), key.end());
+    keys.push_back({key, static_cast<Index>(t)});
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<Index> kept_as(mesh.triangles.size(), kNoIndex);  // at first the number of the first copy
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    kept_as[keys[i].second] =
+        i > 0 && keys[i].first == keys[i - 1].first ? kept_as[keys[i - 1].second] : keys[i].second;
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < kept_as.size(); ++t) {
+    if (std::cmp_not_equal(kept_as[t], t)) {
+      kept_as[t] = kept_as[kept_as[t]];
+      continue;
+    }
+    kept_as[t] = static_cast<Index>(kept);
+    mesh.triangles[kept] = mesh.triangles[t];
+    if (!mesh.face_groups.empty()) mesh.face_groups.of_face[kept] = mesh.face_groups.of_face[t];
+    ++kept;
+  }
+  mesh.triangles.resize(kept);
+  if (!mesh.face_groups.empty()) mesh.face_groups.of_face.resize(kept);
+  return kept_as;
+}
+
 std::vector<SurfaceHalfEdge> sorted_half_edges(std::span<const std::array<Index, 3>> triangles,
                                                std::size_t num_vertices) {
   std::vector<std::size_t> begin(num_vertices + 1, 0);

@@ -33,6 +33,11 @@ WeldedSurface welded(const TriangleMesh& surface);
 /// triangle names a vertex that is not there is returned as it is. Cost: a sort of the edges.
 TriangleMesh joined_at_open_edges(TriangleMesh surface);
 
+/// Drops all but the first of triangles with the same corners, and their groups.
+///
+/// returns  the new number of each triangle; of those that were dropped, that of the first one. Cost: a sort.
+std::vector<Index> drop_copies(TriangleMesh& mesh);
+
 /// One side of a triangle.
 struct SurfaceHalfEdge {
   Index low, high;  ///< its vertices, the smaller number first

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "samples/shapes.h"
+#include "subvol/export/surface_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "tests/support/region_fixtures.h"
@@ -104,6 +105,37 @@ TEST_CASE("A surface with sheets inside is filled region by region, with the tar
   // A mesh with regions is a target, too.
   CHECK(place.run("template auto a.mesh --cells 300 -o c.mesh").status == 0);
   CHECK(region_references(read_volume_mesh(place / "c.mesh")).size() == 5);
+}
+
+TEST_CASE("Named solids of an STL or 3MF become regions of their names", "[cli][regions][slow]") {
+  const Workplace place;
+  write_surface(place / "mount.stl", samples::mount_surface());
+  write_surface(place / "mount.3mf", samples::mount_surface());
+  for (const char* file : {"mount.stl", "mount.3mf"}) {
+    CAPTURE(file);
+    const Run check = place.run(std::string("check ") + file);
+    CHECK(check.status == 1);
+    CHECK(has(check.out, "4: plate of volume 36000, cork of volume 32000, block of volume 32000, pin of volume 39"));
+    CHECK(has(check.out, "4 solids touch: they become the regions plate, cork, block and pin"));
+    CHECK(has(check.out, "a fit fills it:     as 4 regions"));
+  }
+  const Run fit = place.run("fit mount.stl --cells 500 -o a.mesh --report a.json");
+  CAPTURE(fit.err);
+  REQUIRE(fit.status == 0);
+  CHECK(has(fit.err, "4 solids touch"));
+  const nlohmann::json report = place.json("a.json");
+  REQUIRE(report["regions"]["cells"].size() == 4);
+  CHECK(report["regions"]["interfaces"].size() == 3);
+  CHECK(report["repairs"].size() == 1);
+  const VolumeMesh mesh = read_volume_mesh(place / "a.mesh");
+  REQUIRE(mesh.regions.size() == 4);
+  CHECK(mesh.regions[1].name == "cork");
+  // The mesh is compared with the outer surface of the assembly.
+  const Run compared = place.run("check a.mesh --target mount.stl");
+  CHECK(compared.status == 0);
+  CHECK_FALSE(has(compared.err, "warning"));
+  CHECK(place.run("fit mount.stl --regions merge --cells 500 -o b.mesh").status == 0);
+  CHECK(region_references(read_volume_mesh(place / "b.mesh")).size() == 1);
 }
 
 TEST_CASE("A segmentation becomes a template with a region for each label", "[cli][regions][slow]") {
