@@ -45,7 +45,7 @@ if(TARGET subvol_cli)
     set(manuals "")
     macro(add_manual name target command summary)
       add_custom_command(OUTPUT "${made}/${name}.1.gz" DEPENDS ${target} COMMENT "Manual: ${name}(1)" VERBATIM
-        COMMAND ${SUBVOL_HELP2MAN} --no-info --name "${summary}" --version-string "subvol ${PROJECT_VERSION}"
+        COMMAND ${SUBVOL_HELP2MAN} --no-info --name "${summary}" --version-string "${name} ${PROJECT_VERSION}"
           --output "${made}/${name}.1" "${command}"
         COMMAND gzip -9nf "${made}/${name}.1")
       list(APPEND manuals "${made}/${name}.1.gz")
