@@ -90,6 +90,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${PROJECT_BINARY_DIR}")
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ${BUILD_SHARED_LIBS})  # packages that link the library depend on this one
 # The headers include Eigen's; the Python module needs NumPy.
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libeigen3-dev, python3-numpy")
 
