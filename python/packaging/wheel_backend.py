@@ -2,6 +2,7 @@
 """Build backend of pip (PEP 517): a wheel of the Python module that CMake builds and installs."""
 
 import base64
+import glob
 import hashlib
 import os
 import subprocess
@@ -15,7 +16,7 @@ SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file_
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     """Builds the module and returns the wheel's name. config_settings: {"cmake": "-DNAME=VALUE ..."} is passed on."""
-    options = (config_settings or {}).get("cmake", "").split()
+    options = [*viewer_options(), *(config_settings or {}).get("cmake", "").split()]
     with tempfile.TemporaryDirectory() as folder:
         build, stage = os.path.join(folder, "build"), os.path.join(folder, "stage")
         run("cmake", "-S", SOURCE, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DSUBVOL_BUILD_PYTHON=ON",
@@ -24,6 +25,13 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         run("cmake", "--build", build, "--target", "subvol_python")
         run("cmake", "--install", build, "--component", "python", "--prefix", stage, "--strip")
         return write_wheel(stage, wheel_directory)
+
+
+def viewer_options():
+    """The npm packages that cmake/install_viewer has put into a build folder of the sources, if it has."""
+    for folder in sorted(glob.glob(os.path.join(SOURCE, "build", "*", "node", "node_modules"))):
+        return [f"-DSUBVOL_NODE_MODULES={folder}"]
+    return []
 
 
 def run(*command):
