@@ -74,8 +74,8 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOpti
 }
 
 std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::size_t cells) {
-  constexpr int kTries = 3;
-  constexpr double kLess = 0.97;
+  constexpr int kTries = 3;       // grids
+  constexpr double kLess = 0.97;  // after a grid that was too large, share of what would have fitted
   double asked = kRoomForTemplates * static_cast<double>(cells);
   std::optional<AutoTemplate> smallest;
   for (int trial = 1;; ++trial) {
@@ -209,7 +209,7 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
 }
 
 std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
-  constexpr double kMeets = 1;
+  constexpr double kMeets = 1;  // a cell that meets another one is worse than any cell of poor quality
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
     faults.push_back(std::max(0.0, kAcceptableQuality - least));

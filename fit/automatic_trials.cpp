@@ -33,7 +33,7 @@ bool loses_feature(const AutomaticFitTrial& trial) {
 }  // namespace
 
 AutomaticFitOptions checked_options(AutomaticFitOptions options) {
-  constexpr double kLeastQuality = 0.1;
+  constexpr double kLeastQuality = 0.1;  // aims below it are taken as this one: shares of the aim need a divisor
   const auto in_range = [](const char* name, double value, double low, double high) {
     require_in_range("AutomaticFitOptions", name, value, low, high);
   };
@@ -50,6 +50,7 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
 }
 
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
+  // Weight of the share of edges that are not followed closely, and the most that each other miss counts.
   constexpr double kEdgeWeight = 3, kMostMiss = 3;
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
   const double least_acceptable = std::min(kAcceptableQuality, options.quality);

@@ -84,7 +84,8 @@ void HighOrderDriver::look_over_template() {
 /// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
 /// chord errors to be negligible; fewer on surfaces of many faces, where chord errors matter less.
 int HighOrderDriver::sample_intervals(int order) const {
-  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
+  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;  // along an edge of a face
+  // Number of triangles of all faces beyond which edges get no more intervals than they need.
   constexpr double kMostTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const double triangles = 2 * static_cast<double>(target_.surface.num_details());
@@ -96,7 +97,7 @@ int HighOrderDriver::sample_intervals(int order) const {
 /// Returns the number of intervals for measuring: more than for the fit, up to about twice as many, if there are not
 /// too many triangles.
 int HighOrderDriver::measured_intervals() const {
-  constexpr double kMostTriangles = 1e6;
+  constexpr double kMostTriangles = 1e6;  // of all faces together, to bound the time of distances
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const int own = sample_intervals(order_);
   return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)))));
@@ -137,7 +138,7 @@ BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const 
 
 std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;
+  constexpr int kLeastPoints = 5;  // per direction, as on level 1 of subdivision volumes
   std::vector<int> points(space.num_cells());
   std::vector<Vec3> boxes(space.num_cells());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -194,7 +195,7 @@ void HighOrderDriver::begin_stage(const Stage& stage) {
   lambda_ = stage.lambda;
   mean_.reset();
   if (order_ == order_in_progress_) return;
-  constexpr double kExpectedSteps = 20;
+  constexpr double kExpectedSteps = 20;  // of an order, for the progress
   order_in_progress_ = order_;
   // An order takes about a quarter of the work of twice the order.
   const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
@@ -216,7 +217,7 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
 
 /// The patch is a part of the problem of `run_stage`, with the same weights.
 bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
-  constexpr int kRings = 2;
+  constexpr int kRings = 2;                // of cells around the given ones, which move with them
   constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   constexpr std::size_t kMostMovedAsWhole = 3000;  // moving all of so many cells takes seconds, and helps more
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));

@@ -40,7 +40,7 @@ constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
 constexpr double kNearMeanPercent = 0.005;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
-constexpr int kMostDraws = 4, kDrawSteps = 20;
+constexpr int kMostDraws = 4, kDrawSteps = 20;  // draws toward the target in a round, and the steps of each
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
 constexpr double kFairScaledJacobian = 0.5;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
@@ -206,7 +206,7 @@ bool HighOrderFit::run_adaptive_orders() {
 /// their volumes; if nothing is missed, only undoes the rise of lambda by unfolding. A stage that is interrupted or
 /// leaves more than `pairs` self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
-  constexpr double kLeastShare = 1e-3;
+  constexpr double kLeastShare = 1e-3;  // of `lambda_close`, which is 0.005 by default: docs/fitting.md, "The schedule"
   const bool has_volumes = volume_percent() <= kAutomaticVolumePercent;
   const bool is_asked = options_.tolerance_percent || !has_volumes;
   const double least = (is_asked ? kLeastShare : 1) * schedule_.lambda_close;

@@ -167,7 +167,7 @@ MeshCheck count_cells(const VolumeMesh& mesh) {
 template <class Certify, class Position>
 std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify,
                                         const Position& position) {
-  constexpr std::size_t kMostWitnesses = 10;
+  constexpr std::size_t kMostWitnesses = 10;  // of inverted cells in a report
   std::vector<InversionWitness> result;
   for (const Index c : quality.certificate.invalid_cells) {
     if (result.size() == kMostWitnesses) break;

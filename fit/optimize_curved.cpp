@@ -38,6 +38,7 @@ namespace {
 
 /// Cells with a lower scaled Jacobian do not indicate their wanted size.
 constexpr double kTrustedJacobian = 0.3;
+/// Largest number of rounds of untangling, and of rounds without a gain; steps of the minimization of the mean.
 constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kFirstSteps = 20;
 /// Shares of the work at the ends of its parts, for the progress.
 constexpr double kShareOfCurvedUntangling = 0.5, kShareOfMeanDistortion = 0.7;
@@ -140,7 +141,7 @@ void CurvedOptimizer::find_sizes() {
 
 std::unique_ptr<HighOrderEnergy> CurvedOptimizer::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;
+  constexpr int kLeastPoints = 5;  // per direction, as in fits
   std::vector<int> points;
   std::vector<Vec3> boxes;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -189,7 +190,7 @@ CurvedOptimizer::Part CurvedOptimizer::whole() const {
 
 /// A large mesh moves only around the first of the cells, as many as keep the part small.
 CurvedOptimizer::Part CurvedOptimizer::around(std::span<const Index> cells) const {
-  constexpr int kRings = 2;
+  constexpr int kRings = 2;                // of cells around the given ones, which move with them
   constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_.space.num_cells()));
   for (std::size_t count = cells.size(); count > 0; count /= 2)
@@ -220,6 +221,7 @@ bool CurvedOptimizer::run_stage(const std::string& name, Part part, int steps) {
 /// Untangles the mesh as a whole, since a few steps untangle most of it, and then what is left with its surroundings
 /// alone: in the mean over all cells, a few hardly count.
 bool CurvedOptimizer::untangle_cells() {
+  // Steps, for the progress, and the number of parts that are untangled with their surroundings alone.
   constexpr int kExpectedSteps = 60, kMostParts = 4;
   runner_.work().begin_part(kShareOfCurvedUntangling, kExpectedSteps);
   const std::vector<Index>& left = quality_.certificate.not_certified;
@@ -263,7 +265,7 @@ Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValu
 
 /// Minimizes the mean distortion and then lifts the poorest cells. Returns false if the work must end.
 bool CurvedOptimizer::improve() {
-  constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;
+  constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;  // of lifts, each from a new state
   find_sizes();
   runner_.work().begin_part(kShareOfMeanDistortion, kFirstSteps);
   const bool going = run_stage("mean distortion", whole(), kFirstSteps);
@@ -288,7 +290,7 @@ void CurvedOptimizer::finish() {
 }
 
 CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
-  constexpr double kLeastGain = 1e-6;
+  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const QualityReport start = measure();
   quality_ = start;
   const bool was_valid = start.certificate.not_certified.empty();

@@ -45,6 +45,8 @@ struct Progress {
   double mean_jacobian = -1, least_jacobian = -1, max_percent = 0;
 
   bool gains_on(const Progress& before, double wanted_percent) const {
+    // Least rise of the mean scaled Jacobian, of the least one, and least relative fall of the distance: one of them
+    // must be reached for another round to be worth its time.
     constexpr double kLeastGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
     return mean_jacobian - before.mean_jacobian >= kLeastGain ||
            least_jacobian - before.least_jacobian >= kLeastOfWorst ||
@@ -160,8 +162,9 @@ bool MeshOptimizer::untangle_all() {
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
+  // Ideal boxes and weights change after kSteps steps: more steps towards those of before are lost.
   constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
-  constexpr double kLeastLambdaShare = 1.0 / 64;
+  constexpr double kLeastLambdaShare = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
   runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kSteps * kMaxRounds / 2);
@@ -201,7 +204,7 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 /// Returns true if a result is better than a start whose cells are all certified: closer to a surface that the start
 /// was too far from, or of better cells at distances that are within the tolerances or no larger.
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
-  constexpr double kLeastGain = 1e-6;
+  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
   if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||
@@ -216,8 +219,8 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
 /// Raises the least scaled Jacobian towards a goal; if the surface suffers, it counts more in another attempt. Returns
 /// false if the work must end.
 bool MeshOptimizer::raise_quality(double goal) {
-  constexpr double kMoreSurface = 10;
-  constexpr int kAttempts = 2;
+  constexpr double kMoreSurface = 10;  // factor on the weight of the surface in the second attempt
+  constexpr int kAttempts = 2;         // with the weight of the surface as it is, and with kMoreSurface times that
   const Measured before = measure();
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
@@ -240,7 +243,7 @@ bool MeshOptimizer::raise_quality(double goal) {
 /// Raises the least scaled Jacobian to the quality that was asked for and then, from there, beyond it. Returns false if
 /// the work must end.
 bool MeshOptimizer::raise_quality() {
-  constexpr double kBeyond = 0.1;
+  constexpr double kBeyond = 0.1;  // scaled Jacobian that is asked for beyond the aim, once that is reached
   if (options_.quality == 0) return true;
   if (!raise_quality(options_.quality)) return false;
   if (measure_quality(mesh_).min_scaled_jacobian < options_.quality) return true;

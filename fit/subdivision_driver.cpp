@@ -103,7 +103,7 @@ void SubdivisionDriver::sample_target() {
 /// Ends a fit to some of the target's samples with a few steps towards all of them, and rolls them back if more of the
 /// boundary's triangles intersect then. Returns false if the fit must end.
 bool SubdivisionDriver::fit_all_samples() {
-  constexpr int kSteps = 2;
+  constexpr int kSteps = 2;  // the state is close to a minimum already
   if (samples_all_) return true;
   const std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return false;
@@ -153,7 +153,9 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
 /// Makes the level's start valid by continuation from the linear split L of the level below:
 ///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionDriver::start_level() {
-  constexpr int kMaxRounds = 60;
+  constexpr int kMaxRounds = 60;  // of a continuation, to bound the time
+  // Factor on the gain of t until it is feasible, the least gain that counts, and the share of the rest below which the
+  // gain is slow: then lambda rises.
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
   const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;

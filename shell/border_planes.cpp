@@ -87,7 +87,7 @@ std::vector<Run> FlatBorders::loops() const {
 
 /// Cuts a loop at its sharp turns.
 std::vector<Run> FlatBorders::pieces_of(const Run& loop) const {
-  constexpr double kTurnDegrees = 30;
+  constexpr double kTurnDegrees = 30;  // between two edges of a border
   const double least = std::cos(kTurnDegrees * std::numbers::pi / 180);
   const std::size_t n = loop.size();
   std::vector<std::size_t> turns;

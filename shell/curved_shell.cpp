@@ -22,7 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kLeastIntervals = 4;
+constexpr int kLeastIntervals = 4;  // of samples along an edge
 /// Share of the work that is done when the straight shell is there.
 constexpr double kStraightShare = 0.97;
 
@@ -119,7 +119,7 @@ class CurvedShellCheck {
 /// columns that stay in a plane move in it.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
-  constexpr int kLeastPoints = 5;
+  constexpr int kLeastPoints = 5;  // per direction, as in fits
   SparseMap nodes;
   std::vector<Vec3> fixed(mesh.coefficients.size(), Vec3::Zero());
   for (std::size_t i = 0; i < fixed.size(); ++i) {

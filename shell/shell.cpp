@@ -27,7 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxRounds = 12;
+constexpr int kMaxRounds = 12;  // solves: strands that fail in all of them end at 0.02 of their thickness
 
 void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -253,7 +253,7 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
   std::unique_ptr<SurfaceTerm> surface;
   double lambda = 1;
   if (options_.free_surface) {
-    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;
+    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;  // relative to 1 along the normal
     for (std::size_t v = 0; v < layers_.num_columns(); ++v) {
       sampled.push_back(layers_.vertex(layers_.inside, static_cast<Index>(v)));
       fixed_samples.push_back(fixed[sampled.back()]);
@@ -305,7 +305,7 @@ MinimizerStop ShellMaker::solve(int round) {
 }
 
 void ShellMaker::optimize() {
-  constexpr double kShrink = 0.7;
+  constexpr double kShrink = 0.7;  // of the thickness of strands that still meet another sheet
   bool apart = false;
   for (int round = 0; round < kMaxRounds && !apart && !ended_; ++round) {
     const MinimizerStop stop = solve(round);

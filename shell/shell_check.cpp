@@ -26,7 +26,7 @@ void sort_unique(std::vector<Index>& list) {
 
 /// Lowers the shares around strands that were held back, so that neighbors differ by at most a quarter.
 void grade(const ShellLayers& layers, std::vector<double>& shares) {
-  constexpr double kStep = 0.25;
+  constexpr double kStep = 0.25;  // of the whole way
   const SurfaceTopology& topology = layers.topology;
   const std::size_t num_columns = layers.num_columns();
   for (int sweep = 0; sweep < static_cast<int>(1 / kStep); ++sweep)
@@ -99,7 +99,7 @@ NodeStrands vertex_strands(const ShellLayers& layers) {
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted, const std::function<bool()>& ended,
                           std::vector<double>* shares_out) {
-  constexpr double kShrink = 0.7, kLeast = 0.05;
+  constexpr double kShrink = 0.7, kLeast = 0.05;  // of a share; below kLeast it is 0, so that few shrinkings decide
   std::vector<double> shares(layers.num_strands(), 1.0);
   std::vector<Vec3> state(wanted.begin(), wanted.end());
   for (;;) {

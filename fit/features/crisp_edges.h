@@ -29,6 +29,7 @@ struct EdgeCrispness {
   /// length of less than 1, or at most 0.95 in the first sum, but for two coarse meshes of animals, and at most 1.24 in
   /// the second one. The parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
+    // Relative length that counts as much as a crisp share of 1, and the factor on the planar share.
     constexpr double kLong = 15, kOfPlanes = 2;
     constexpr double kLeastLength = 0.3;  // more than the rim of a hole that was covered in a scan
     const double crisp = crisp_share + relative_length / kLong;

@@ -53,7 +53,7 @@ class ClosestPoint {
   std::span<const Index> order() const { return order_; }
 
  private:
-  static constexpr int kWidth = 8;
+  static constexpr int kWidth = 8;  // children of a node: as many boxes as one vector instruction tests
 
   /// Boxes of the children, coordinate by coordinate, so that all of them are tested at once.
   struct Node {

@@ -177,7 +177,7 @@ class CrackSets {
 };
 
 bool CrackSets::find_pairs() {
-  constexpr std::size_t kMostPairs = 10'000'000;
+  constexpr std::size_t kMostPairs = 10'000'000;  // tests of distances, to bound the time
   std::vector<Index> vertices;
   for (const auto& edge : rims_) vertices.insert(vertices.end(), edge.begin(), edge.end());
   std::sort(vertices.begin(), vertices.end());

@@ -21,7 +21,7 @@ constexpr double kMargin = 0.15;
 /// A coarse mesh needs no more than this below the goal: refining raises the mean, and the lift of the fine mesh the
 /// least.
 constexpr double kCoarseMargin = 0.05;
-constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;
+constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;  // of the lift of a whole mesh
 
 /// Width of the strip of surface that counts as much as a crease, in edges.
 constexpr double kCreaseEdges = 5;
@@ -41,7 +41,7 @@ double above(double goal, double margin = kMargin) { return std::min(0.95, goal 
 }  // namespace
 
 double LiftMerit::cost_of_cell(double share) const {
-  constexpr double kPoor = 0.8;
+  constexpr double kPoor = 0.8;  // share of the goal below which a cell costs more
   return 1 - share + poor * std::max(0.0, kPoor - share);
 }
 
@@ -224,6 +224,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
 /// Raises the emphasis of sample triangles that are too far from the target, and notes the cells at
 /// triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
 double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
+  // Factors on the emphasis of a triangle that is too far, or near enough, and the largest emphasis.
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
@@ -323,7 +324,7 @@ bool QualityStages::run_patches(const QualitySchedule& of_patch, std::span<const
 bool QualityStages::relax(std::span<const Index> centers, int rings, const QualityStage& stage,
                           const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x,
                           FitReport& report) {
-  constexpr double kNoGoal = 0.1;
+  constexpr double kNoGoal = 0.1;  // scaled Jacobian; of no effect, since there is no lift
   runner_ = &runner;
   record_ = record;
   report_ = &report;
@@ -336,7 +337,7 @@ bool QualityStages::relax(std::span<const Index> centers, int rings, const Quali
 /// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kSteps = 2, kPatience = 5;
+  constexpr int kSteps = 2, kPatience = 5;  // of a round; rounds without a better state
   constexpr double kWorthwhile = 0.7;  // a round of the whole mesh must leave less than this share of the poor cells
   const bool is_patch = patch_mesh_ != nullptr;
   // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:

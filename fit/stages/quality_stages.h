@@ -116,7 +116,7 @@ class QualityStages {
 
   /// A state that the lift reached.
   struct State {
-    static constexpr double kNotJudged = -1e300;
+    static constexpr double kNotJudged = -1e300;  // below the merit of every state
     QualityEnergy::State cells;
     double merit = kNotJudged;       ///< see `LiftMerit`. 1: all aims are reached
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending

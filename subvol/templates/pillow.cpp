@@ -126,7 +126,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
 /// origins  numbers of all vertices for the message.
 void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps,
                    std::span<const Index> origins) {
-  constexpr int kRounds = 20;
+  constexpr int kRounds = 20;  // 1e-6 of a step is none
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < number.size(); ++v)
     if (number[v] != kNoIndex) old[number[v]] = static_cast<Index>(v);
