@@ -64,8 +64,8 @@ std::function<bool(double)> AutomaticDriver::begin_template() {
   begin_part(kTemplatePortion, 1);
   return [this](double fraction) {
     runner_.work().set(fraction);
-    return !runner_.is_to_end() &&
-           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
+    return !runner_.is_to_end() && (!options_.control.progress ||
+                                    options_.control.progress({"template", 0, 0, fraction, runner_.work().share()}));
   };
 }
 

@@ -11,6 +11,7 @@
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
@@ -40,8 +41,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   in_range("order", options.order, 1, kMaxOrder);
   if (options.lambda_close) in_range("lambda_close", *options.lambda_close, 1e-9, 1e9);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  check_control("HighOrderFitOptions", options.control);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   in_range("quality", options.quality, 0, kMostQuality);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
@@ -63,8 +63,7 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
       template_(checked_template(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
-               options.log}) {
+      runner_(options.control, options.solver) {
   target_.normalization.take_in(template_);
   mesh_.coefficients = template_.positions;
   creases_ = creases_along_target(target_, crease_rule(), template_);
@@ -86,21 +85,21 @@ void HighOrderDriver::look_over_template() {
 int HighOrderDriver::sample_intervals(int order) const {
   constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;  // along an edge of a face
   // Number of triangles of all faces beyond which edges get no more intervals than they need.
-  constexpr double kMostTriangles = 60000;
+  constexpr double kMostFittedTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const double triangles = 2 * static_cast<double>(target_.surface.num_details());
   const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
-  const int affordable = static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)));
+  const int affordable = static_cast<int>(std::sqrt(kMostFittedTriangles / (2 * faces)));
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
 }
 
 /// Returns the number of intervals for measuring: more than for the fit, up to about twice as many, if there are not
 /// too many triangles.
 int HighOrderDriver::measured_intervals() const {
-  constexpr double kMostTriangles = 1e6;  // of all faces together, to bound the time of distances
+  constexpr double kMostMeasuredTriangles = 1e6;  // of all faces together, to bound the time of distances
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const int own = sample_intervals(order_);
-  return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)))));
+  return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostMeasuredTriangles / (2 * faces)))));
 }
 
 bool HighOrderDriver::end_for_memory(const std::string& why) {

@@ -44,8 +44,8 @@ HighOrderMesh cells_of(const HighOrderMesh& mesh, std::span<const Index> cells);
 /// Makes the minimization over the unknowns of a patch.
 ///
 /// volume   energy of `patch.space`, which the problem refers to.
-/// samples  of the boundary of the whole mesh.  surface  E_S on them, at least `assign_target` at these coefficients: the
-///          part of the target that corresponds to the patch there goes with it.
+/// samples  of the boundary of the whole mesh.  surface  E_S on them, at least `assign_target` at these coefficients:
+///          the part of the target that corresponds to the patch there goes with it.
 FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coefficients,
                          std::unique_ptr<VolumeTerm> volume, const BoundarySamples& samples,
                          const ClosestPointEnergy& surface, double lambda);

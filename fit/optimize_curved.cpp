@@ -14,6 +14,7 @@
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/fit_problem.h"
 #include "subvol/fit/stages/quality_patches.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/untangle.h"
 #include "subvol/mesh/pyramids.h"
@@ -39,7 +40,7 @@ namespace {
 /// Cells with a lower scaled Jacobian do not indicate their wanted size.
 constexpr double kTrustedJacobian = 0.3;
 /// Largest number of rounds of untangling, and of rounds without a gain; steps of the minimization of the mean.
-constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kFirstSteps = 20;
+constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kMeanDistortionSteps = 20;
 /// Shares of the work at the ends of its parts, for the progress.
 constexpr double kShareOfCurvedUntangling = 0.5, kShareOfMeanDistortion = 0.7;
 
@@ -48,8 +49,7 @@ CurvedOptimizeOptions checked(const CurvedOptimizeOptions& options) {
     require_in_range("CurvedOptimizeOptions", name, value, low, high);
   };
   in_range("quality", options.quality, 0, kMostQuality);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  check_control("CurvedOptimizeOptions", options.control);
   return options;
 }
 
@@ -124,8 +124,7 @@ CurvedOptimizer::CurvedOptimizer(const HighOrderMesh& mesh, const VolumeMesh& la
       mesh_(box_.to_unit(mesh)),
       labels_(labels),
       projectors_(sheet_projectors(mesh_, labels, options.fixed_boundary)),
-      runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-               options.cancelled, options.log}) {}
+      runner_(options.control) {}
 
 /// Sizes of cells that are inverted or poor say nothing; the sizes around them do.
 void CurvedOptimizer::find_sizes() {
@@ -267,8 +266,8 @@ Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValu
 bool CurvedOptimizer::improve() {
   constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;  // of lifts, each from a new state
   find_sizes();
-  runner_.work().begin_part(kShareOfMeanDistortion, kFirstSteps);
-  const bool going = run_stage("mean distortion", whole(), kFirstSteps);
+  runner_.work().begin_part(kShareOfMeanDistortion, kMeanDistortionSteps);
+  const bool going = run_stage("mean distortion", whole(), kMeanDistortionSteps);
   quality_ = measure();
   if (!going || options_.quality == 0) return going;
   runner_.work().begin_part(1, kExpectedLiftSteps);

@@ -13,6 +13,7 @@
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/free_nodes.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -39,9 +40,8 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   in_range("lambda", options.lambda, 1e-9, 1e9);
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  check_control("OptimizeOptions", options.control);
   in_range("quality", options.quality, 0, kMostQuality);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (has_target && options.fixed_boundary)
     throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");
   return options;
@@ -61,8 +61,7 @@ OptimizeDriver::OptimizeDriver(const VolumeMesh& mesh, const TriangleMesh* targe
       own_boundary_(!target),
       target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
       relief_(mesh.num_cells(), 1),
-      runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-               options.cancelled, options.log}) {
+      runner_(options.control) {
   target_.normalization.take_in(mesh_);
   target_.keep_interfaces(mesh_);
   interfaces_ = find_interfaces(mesh_, topology_);

@@ -162,9 +162,9 @@ bool MeshOptimizer::untangle_all() {
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
-  // Ideal boxes and weights change after kSteps steps: more steps towards those of before are lost.
+  // Ideal boxes and weights change after kSteps steps: more steps toward those of before are lost.
   constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
-  constexpr double kLeastLambdaShare = 1.0 / 64;  // of the first lambda: six halvings
+  constexpr double kLeastShareOfLambda = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
   runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kSteps * kMaxRounds / 2);
@@ -174,7 +174,7 @@ bool MeshOptimizer::improve() {
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
     const bool too_far = mean_percent_ > kMeanShareOfTolerance * options_.mean_tolerance_percent ||
                          (held_ != Held::nothing && changes_volumes());
-    if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
+    if (too_far && lambda > kLeastShareOfLambda * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxShareOfTolerance * options_.max_tolerance_percent)) {
       gains_ended_ = true;
@@ -216,7 +216,7 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
   return gain > kLeastGain || (gain > -kLeastGain && now.mean_jacobian > start.mean_jacobian + kLeastGain);
 }
 
-/// Raises the least scaled Jacobian towards a goal; if the surface suffers, it counts more in another attempt. Returns
+/// Raises the least scaled Jacobian toward a goal; if the surface suffers, it counts more in another attempt. Returns
 /// false if the work must end.
 bool MeshOptimizer::raise_quality(double goal) {
   constexpr double kMoreSurface = 10;  // factor on the weight of the surface in the second attempt
@@ -265,7 +265,7 @@ void MeshOptimizer::keep_volumes() {
 
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
 bool MeshOptimizer::steps_ran_out() const {
-  return options_.max_iterations > 0 &&
+  return options_.control.max_iterations > 0 &&
          std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
            return stage.kept && !stage.raises_quality && stage.ended == MinimizerStop::iteration_limit;
          });
@@ -288,7 +288,7 @@ void MeshOptimizer::finish(bool going) {
     report_.explanation = formatted("all cells are valid%s; boundary within %.4g %% of its surface",
                                     gains_ended_ && !cut_short ? " and no longer gain" : "", max_percent_);
     if (cut_short)
-      report_.explanation += formatted("; stages took all of the %d steps allowed", options_.max_iterations);
+      report_.explanation += formatted("; stages took all of the %d steps allowed", options_.control.max_iterations);
   }
 }
 

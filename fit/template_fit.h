@@ -17,6 +17,7 @@ inline constexpr double kTemplateMeanPercent = 0.3, kTemplateMaxPercent = 2;  //
 /// Number that is tried after those for curved cells, which are not subdivided, if the target has sharp edges to
 /// follow.
 inline constexpr std::size_t kCurvedEdgeCells = 10000;
+/// The fit that a template is made for.
 enum class TemplateUse { subdivision, curved_cells };
 
 /// Number of cells of the template if the target has several regions and no number is given.

@@ -160,8 +160,7 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
            FitReport& report) {
   std::vector<Vec3> unknowns;
   FitProblem problem = make_problem(shell, mesh, strands, unknowns);
-  const StageRunner runner({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-                            options.cancelled});
+  const StageRunner runner(options.control);
   StageRecord record;
   record.name = "order " + std::to_string(options.order);
   record.order = options.order;
@@ -180,7 +179,7 @@ CurvedShellOptions checked(const ShellResult& shell, const CurvedShellOptions& o
   if (options.order < 1 || options.order > kMaxOrder)
     throw InputError("shell: the order must be in 1 .. " + std::to_string(kMaxOrder) + ", got " +
                      std::to_string(options.order));
-  if (options.max_iterations < 0 || !(options.time_limit_seconds >= 0))
+  if (options.control.max_iterations < 0 || !(options.control.time_limit_seconds >= 0))
     throw InputError("shell: limits of a solve must not be negative");
   if (!shell.failures.none()) throw InputError("shell: only a valid shell can be curved");
   return options;
@@ -223,10 +222,10 @@ CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unch
   const std::vector<Vec3> straight = curved.mesh.coefficients;
   const auto begin = Clock::now();
   const auto is_late = [&] {
-    return options.time_limit_seconds > 0 &&
-           std::chrono::duration<double>(Clock::now() - begin).count() > options.time_limit_seconds;
+    return options.control.time_limit_seconds > 0 &&
+           std::chrono::duration<double>(Clock::now() - begin).count() > options.control.time_limit_seconds;
   };
-  const auto ended = [&] { return (options.cancelled && options.cancelled()) || is_late(); };
+  const auto ended = [&] { return (options.control.cancelled && options.control.cancelled()) || is_late(); };
   solve(shell, options, strands, curved.mesh, curved.report);
 
   const CurvedShellCheck check(shell.layers, space, options);

@@ -347,8 +347,8 @@ void add_batch_command(CLI::App& app, Action& action) {
   arguments->options.jobs = 0;
   verb->add_option("MODELS", arguments->words,
                    "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs");
-  // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS, which
-  // comes first, receives them; this one shows them in the help.
+  // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS,
+  // which comes first, receives them; this one shows them in the help.
   verb->add_option("OPTIONS", arguments->words_for_all, "Options for every model, behind --");
   verb->add_option("-o,--output", arguments->folder, "Folder of the batch; it may exist")->type_name("FOLDER");
   verb->add_option("--row", arguments->rows, R"(A model as JSON: {"id": "bone", "input": "bone.off", "cells": 300})")

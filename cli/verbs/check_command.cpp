@@ -187,7 +187,7 @@ void add_check_command(CLI::App& app, Action& action) {
                    "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");
   verb->add_option("--chord", arguments->chord_percent,
-                   "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")
+                   "A curved boundary is looked at as triangles this close to it, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();

@@ -137,12 +137,13 @@ void FitRun::load() {
 
 void FitRun::load_template() {
   AutomaticFitOptions options = template_options(arguments_);
-  options.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
+  options.control.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.control.time_limit_seconds;
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
     untangle_template(arguments_.template_mesh.path, arguments_.run,
-                      {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
+                      {.control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds}}, template_mesh_,
+                      warnings_);
   made_ = std::move(loaded.made);
   require_regions(outputs_, regions_of(template_mesh_));
   FittedTarget fitted = fitted_target(target_, template_mesh_);
@@ -161,17 +162,15 @@ void FitRun::fit() {
   options.solver = solver_kind(arguments_);
   checkpointing_.emplace(
       run_, run_identity(verb_, {{"target", fingerprint(target_)}, {"template", fingerprint(template_mesh_)}}));
-  options.log = checkpointing_->log();
+  options.control.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // Making the template may have used part of the time limit.
-  if (options.time_limit_seconds > 0)
-    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
+  if (options.control.time_limit_seconds > 0)
+    options.control.time_limit_seconds = std::max(1e-3, options.control.time_limit_seconds - seconds());
   options.point_weights = point_weights(arguments_);
   options.distortion = distortion(arguments_);
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
+  result_ = followed(options.control, [&] {
     return std::visit([&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); },
                       target_);
   });
@@ -266,7 +265,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str();
   verb.add_option(
           "--tolerance", fit.tolerance_percent,
-          "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
+          "Mean distance to reach, in percent of the diagonal of the target's bounding box; exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--max-tolerance", arguments.max_tolerance_percent,
@@ -371,8 +370,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
   if (verb.count("--levels") > 0) fit.levels = arguments.fit.levels;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
-  fit.max_iterations = arguments.fit.max_iterations;
-  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.control = arguments.fit.control;
   result.unused_options = {"basis", "map-tolerance", "adaptive"};
   for (const std::string option : kMethodOptions) result.unused_options.push_back(option.substr(2));
   if (!fit.makes_cage) result.unused_options.push_back("levels");
@@ -397,8 +395,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.correspondence = correspondence(arguments);
   fit.point_weights = point_weights(arguments);
   fit.distortion = distortion(arguments);
-  fit.max_iterations = arguments.fit.max_iterations;
-  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.control = arguments.fit.control;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
 }
@@ -460,11 +457,12 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("equal|area")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
+  verb.add_option("--max-iterations", fit.control.max_iterations,
+                  "Steps per stage (default: as many as the schedule asks for)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N")
       ->group(group);
-  verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
+  verb.add_option("--time-limit", fit.control.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS")
       ->group(group);

@@ -142,11 +142,7 @@ void ShellRun::grow() {
     if (arguments_.crease_angle_degrees)
       options.tags = surface_features(surface_.polygons, *arguments_.crease_angle_degrees);
     take_surface(surface_, options);
-    result_ = followed([&](auto progress) {
-      options.progress = progress;
-      options.cancelled = interrupted;
-      return make_shell(surface_.polygons, options);
-    });
+    result_ = followed(options.control, [&] { return make_shell(surface_.polygons, options); });
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
   }
@@ -179,17 +175,13 @@ void ShellRun::curve() {
   }
   CurvedShellOptions options{.order = arguments_.order,
                              .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
-                             .max_iterations = arguments_.shell.max_iterations};
-  if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
-    options.time_limit_seconds = std::max(1e-3, limit - seconds());
+                             .control = {.max_iterations = arguments_.shell.control.max_iterations}};
+  if (const double limit = arguments_.shell.control.time_limit_seconds; limit > 0)
+    options.control.time_limit_seconds = std::max(1e-3, limit - seconds());
   options.boundary = [&](const HighOrderMesh& mesh) {
     return curved_boundary(mesh, measured_chord_percent(arguments_.writing));
   };
-  curved_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    return curve_shell(result_, options);
-  });
+  curved_ = followed(options.control, [&] { return curve_shell(result_, options); });
   take_figures(*curved_, result_);
   add_warnings(curved_->report.warnings);
 }
@@ -379,10 +371,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->capture_default_str()
       ->needs(order);
   add_map_tolerance(verb, arguments.writing)->needs(order);
-  verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
+  verb.add_option("--max-iterations", shell.control.max_iterations, "Steps per solve (default: 60)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
-  verb.add_option("--time-limit", shell.time_limit_seconds, "Stop after this time with the best result so far")
+  verb.add_option("--time-limit", shell.control.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
 }

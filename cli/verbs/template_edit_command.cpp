@@ -247,7 +247,7 @@ void add_grid(CLI::App& group, Action& action) {
   verb->add_option("--size", a->size, "Or: about how long a cell is")
       ->check(number_in(1e-300, 1e300))
       ->type_name("LENGTH");
-  verb->add_option("--margin", a->margin, "How far the box stands off the surface, in per cent of its diagonal")
+  verb->add_option("--margin", a->margin, "How far the box stands off the surface, in percent of its diagonal")
       ->check(number_in(0.0, 1000.0))
       ->type_name("PERCENT")
       ->capture_default_str()
@@ -335,7 +335,7 @@ void add_merge(CLI::App& group, Action& action) {
   add_mesh(*verb, *a);
   verb->add_option("OTHER", a->other, "Mesh to put beside it first")->type_name("FILE");
   verb->add_option("--tolerance", a->tolerance,
-                   "Distance up to which vertices are one, in per cent of the box's diagonal")
+                   "Distance up to which vertices are one, in percent of the box's diagonal")
       ->check(number_in(0.0, 10.0))
       ->type_name("PERCENT")
       ->capture_default_str();

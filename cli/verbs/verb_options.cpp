@@ -115,7 +115,7 @@ CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {
   return verb
       .add_option("--map-tolerance", options.map_tolerance_percent,
                   "Largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, in\n"
-                  "per cent of the diagonal; if it is larger, the program says so and ends with status 4")
+                  "percent of the diagonal; if it is larger, the program says so and ends with status 4")
       ->check(number_in(0.0, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
@@ -184,7 +184,7 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,
-                  "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
+                  "Largest distance between a limit surface and its triangles, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str()

@@ -138,7 +138,7 @@ void add_view_command(CLI::App& app, Action& action) {
       ->type_name("SURFACE");
   verb->add_flag("--limit", arguments->viewing.limit, "The mesh is a control cage: show its limit surface, too");
   verb->add_option("--chord", arguments->viewing.chord_percent,
-                   "Largest distance of the drawn limit surface from the true one, in per cent of its box's diagonal")
+                   "Largest distance of the drawn limit surface from the true one, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();

@@ -11,8 +11,8 @@ namespace subvol::internal {
 
 /// How much the sharp edges of a surface stand out from what is around them.
 struct EdgeCrispness {
-  /// Share of the curves' length along which no other edge of the two triangles bends by more than a third of the edge's
-  /// own angle; edges that belong to curves do not count as others. 0 without curves.
+  /// Share of the curves' length along which no other edge of the two triangles bends by more than a third of the
+  /// edge's own angle; edges that belong to curves do not count as others. 0 without curves.
   double crisp_share = 0;
   /// Length of the curves that are crisp along most of their length and longer than 3 % of the diagonal of their
   /// connected part, divided by the square root of the surface's area.

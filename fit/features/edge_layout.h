@@ -30,8 +30,8 @@ struct EdgeLayout {
   VolumeMesh tagged_mesh;
 };
 
-/// Routes the features (`route_features`), divides the boundary (`patched_mesh`), pads it (`add_pads`), and prepares what
-/// a fit needs.
+/// Routes the features (`route_features`), divides the boundary (`patched_mesh`), pads it (`add_pads`), and prepares
+/// what a fit needs.
 ///
 /// grid     hexes; passes `validate` except for unused vertices.
 /// fitted   positions of its vertices near the target.

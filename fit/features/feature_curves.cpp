@@ -3,6 +3,7 @@
 
 #include "subvol/base/angle.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 

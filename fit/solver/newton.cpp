@@ -94,7 +94,6 @@ NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
 }
 
 NewtonRun::Search NewtonRun::search_line(bool may_stiffen, IterationRecord& record) {
-  constexpr double kArmijo = 1e-4;  // the usual share of the decrease that the slope promises
   constexpr int kMaxHalvings = 30;  // a step of 1e-9 is none
   problem_.multiply_samples(d_, dz_);
   bool cut_back = false, drawn_back = !problem_.volume->keeps_off_inversion();

@@ -11,7 +11,8 @@
 
 namespace subvol::internal {
 
-/// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are ascending.
+/// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are
+/// ascending.
 struct QualityPatch {
   std::vector<Index> unknowns;   ///< degrees of freedom that move
   std::vector<Index> cells;      ///< those with a vertex that moves with them

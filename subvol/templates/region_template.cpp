@@ -268,7 +268,7 @@ std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, 
 
 std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
   constexpr double kMost = 1.25;  // share of the count asked for, or its inverse, beyond which the size is corrected
-  constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
+  constexpr std::array<double, 3> kCubeSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
   const auto labeled_cubes = [&](const Mat3& frame, double size, double offset) -> std::optional<LabeledGrid> {
@@ -278,7 +278,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   };
   double size = size_for(cells, options_.for_pillow);
   std::optional<LabeledGrid> best;
-  for (const double factor : kSizes)
+  for (const double factor : kCubeSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
@@ -290,7 +290,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
           if (found) size = corrected;
         }
         if (found && (!best || is_better(*found, *best))) best = std::move(found);
-        if (best && best->wrong_sheets == 0 && factor != kSizes.front()) return best;
+        if (best && best->wrong_sheets == 0 && factor != kCubeSizes.front()) return best;
       }
   return best;
 }
