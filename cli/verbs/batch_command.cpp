@@ -275,7 +275,7 @@ void add_report(CLI::App& group, Action& action) {
   verb->add_flag("--json", arguments->json, "Print counts, quantiles and differences as JSON");
   verb->add_flag("--no-pictures", arguments->no_pictures, "Leave out the pictures of the worst results");
   verb->add_flag("--force", arguments->force, "Replace an existing page");
-  verb->add_flag("--quiet", arguments->quiet, "Say nothing");
+  verb->add_flag("--quiet", arguments->quiet, "Print nothing");
   verb->callback([arguments, &action] { action = [arguments] { return run_batch_report(*arguments); }; });
 }
 
@@ -364,11 +364,11 @@ void add_batch_command(CLI::App& app, Action& action) {
   add_planning_options(*verb, *arguments);
   add_process_options(*verb, arguments->options);
   verb->add_option("--progress", arguments->options.progress,
-                   "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+                   "How progress is shown: bar (default on a terminal) or plain on stderr, json on stdout, none")
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
   verb->add_flag("--print", arguments->options.print_records, "Print the record of each model at the end");
-  verb->add_flag("--quiet", arguments->options.quiet, "Say nothing but errors");
+  verb->add_flag("--quiet", arguments->options.quiet, "Print only errors");
   add_report(*verb, action);
   add_batch_merge(*verb, action);
   verb->footer(kFooter);

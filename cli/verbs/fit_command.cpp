@@ -419,7 +419,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   const auto group = "Solver";
   verb.add_option("--lambda-far", fit.lambda_far,
-                  "Largest weight of the cells' shape to which the way from one level to the next may raise it")
+                  "Upper limit of the weight of the cells' shape while a level is started")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
@@ -427,7 +427,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_option(
           "--lambda-close", fit.lambda_close,
           "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
-          "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, or\n"
+          "(0.015 if none is given) and falls by more than the cells' distortion rises. With --order: 0.05, or\n"
           "0.0025 if creases follow nearly all sharp edges, lowered for a --tolerance and volumes of regions")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
@@ -439,7 +439,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->group(group);
   verb.add_option("--correspondence", arguments.correspondence,
-                  "What pulls at what: exact closest points both ways, or the restricted Voronoi cells of the paper")
+                  "How correspondences are chosen: exact closest points both ways, or the restricted Voronoi cells of "
+                  "the paper")
       ->check(CLI::IsMember({"closest", "voronoi"}))
       ->type_name("closest|voronoi")
       ->capture_default_str()
@@ -452,7 +453,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->group(group);
   verb.add_option(
           "--point-weights", arguments.point_weights,
-          "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
+          "How much each point of a cloud counts: all alike, or by the area that it represents, for uneven scans")
       ->check(CLI::IsMember({"equal", "area"}))
       ->type_name("equal|area")
       ->capture_default_str()

@@ -104,7 +104,7 @@ void add_optimize_command(CLI::App& app, Action& action) {
   subvol optimize tangled.mesh -o valid.mesh --report valid.json
   subvol optimize tets.mesh --order 3 --target part.off -o curved.vtu
 
-What is written is checked: exit status 1 where a cell is not proved positive or the boundary meets itself.
+What is written is checked: exit status 1 if a cell is not proved positive or the boundary meets itself.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
   verb->callback(
       [arguments, verb, &action] { action = [arguments, verb] { return run_optimize(*arguments, *verb); }; });

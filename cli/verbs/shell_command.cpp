@@ -327,7 +327,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->check(whole_number_in(1, 1000))
       ->type_name("N")
       ->capture_default_str();
-  verb.add_option("--growth", shell.growth, "Thickness of a layer against that of the one nearer the surface")
+  verb.add_option("--growth", shell.growth, "Thickness of a layer relative to that of the next one toward the surface")
       ->check(number_in(0.01, 100.0))
       ->type_name("FACTOR")
       ->capture_default_str();
@@ -346,15 +346,15 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->allow_extra_args(false)
       ->type_name("PATCH");
   verb.add_option("--repair", arguments.repair,
-                  "Faults of the surface are repaired by changes within this distance, a length or 2%; 0: none are")
+                  "Faults of the surface are repaired by changes within this distance, a length or 2%; 0: no repair")
       ->type_name("DISTANCE")
       ->capture_default_str();
-  verb.add_option("--side", arguments.side, "Where the faces' normals point, or against them")
+  verb.add_option("--side", arguments.side, "Along the normals of the faces, against them, or both")
       ->check(CLI::IsMember({"outward", "inward", "both"}))
       ->type_name("outward|inward|both")
       ->capture_default_str();
   verb.add_flag("--free-surface", shell.free_surface,
-                "Let the surface's vertices slide along it for the cells' sake; its border and creases stay");
+                "Let the surface's vertices slide along it for better cells; its border and creases stay");
   verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimization");
   verb.add_option("--crease-angle", arguments.crease_angle_degrees,
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
@@ -398,7 +398,7 @@ void add_shell_command(CLI::App& app, Action& action) {
   verb->footer(R"(Example:
   subvol shell bone.off --thickness 2% --layers 3 --side both -o bone_shell.vtu -o bone_shell.glb
 
-Where there is no room the shell gets thinner; the report and the files tell where. What is written is checked:
+The shell is thinner where there is no room; the report and the files say where. What is written is checked:
 every cell certified, no sheet meeting another; otherwise exit status 1.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
   verb->callback([arguments, verb, &action] {

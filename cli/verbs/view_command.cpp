@@ -144,7 +144,7 @@ void add_view_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   add_references_option(*verb, arguments->run);
   verb->add_flag("--force", arguments->run.force, "Replace an existing file");
-  verb->add_flag("--quiet", arguments->run.quiet, "Say nothing");
+  verb->add_flag("--quiet", arguments->run.quiet, "Print nothing");
   add_resource_options(*verb, arguments->run);
   verb->footer(R"(The page works without network. Curved cells are drawn curved, inverted ones are marked.
 
