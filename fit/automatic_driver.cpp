@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_driver.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
@@ -162,8 +163,7 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
   const std::vector<double> least = measure_quality(mesh_).cell_minima;
   for (std::size_t c = 0; c < least.size(); ++c)
     if (least[c] < hopeless_quality(options_)) cells.push_back(static_cast<Index>(c));
-  std::ranges::sort(cells);
-  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  sort_unique(cells);
   return cells;
 }
 

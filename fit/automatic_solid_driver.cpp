@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_solid_driver.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/signed_features.h"
 #include "subvol/fit/fits/flat_faces.h"
@@ -247,8 +248,7 @@ std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   std::vector<Fault> faults;
   if (meets_itself(best())) {
     std::vector<Index> meeting = cells_that_meet(result_.mesh);
-    std::ranges::sort(meeting);
-    meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());
+    sort_unique(meeting);
     for (const Index c : meeting) faults.push_back({c});
   }
   const std::vector<double> least = measure_quality(result_.mesh).cell_minima;

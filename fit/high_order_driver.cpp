@@ -11,6 +11,7 @@
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
+#include "subvol/fit/stages/quality_patches.h"
 #include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/pyramids.h"
@@ -137,13 +138,12 @@ BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const 
 
 std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;  // per direction, as on level 1 of subdivision volumes
   std::vector<int> points(space.num_cells());
   std::vector<Vec3> boxes(space.num_cells());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t c = cells.empty() ? i : static_cast<std::size_t>(cells[i]);
-    points[i] = std::max(
-        {kLeastPoints, points_for_order(space.pattern_order(space.pattern(i))), stays_dense_ ? points_[c] : 0});
+    points[i] = std::max({kLeastDistortionPoints, points_for_order(space.pattern_order(space.pattern(i))),
+                          stays_dense_ ? points_[c] : 0});
     boxes[i] = ideal_boxes_[c];
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
@@ -216,14 +216,12 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
 
 /// The patch is a part of the problem of `run_stage`, with the same weights.
 bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
-  constexpr int kRings = 2;                // of cells around the given ones, which move with them
-  constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   constexpr std::size_t kMostMovedAsWhole = 3000;  // moving all of so many cells takes seconds, and helps more
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));
   std::optional<HighOrderPatch> patch;
   if (options_.correspondence == Correspondence::closest)
     for (std::size_t count = cells.size(); count > 0 && !patch; count /= 2) {
-      patch = high_order_patch(template_, mesh_.space, cells.first(count), kRings, most);
+      patch = high_order_patch(template_, mesh_.space, cells.first(count), kHighOrderRings, most);
       if (template_.num_cells() <= kMostMovedAsWhole) break;
     }
   if (!patch) return run_stage(stage);

@@ -16,6 +16,9 @@
 
 namespace subvol::internal {
 
+/// Rings of cells around the given ones that move with them.
+inline constexpr int kHighOrderRings = 2;
+
 /// A part of a mesh of curved cells around a few of them: everything outside is held fixed. The lists of numbers of the
 /// mesh are ascending, except `nodes`.
 struct HighOrderPatch {

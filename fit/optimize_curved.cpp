@@ -37,8 +37,6 @@ using namespace internal;
 
 namespace {
 
-/// Cells with a lower scaled Jacobian do not indicate their wanted size.
-constexpr double kTrustedJacobian = 0.3;
 /// Largest number of rounds of untangling, and of rounds without a gain; steps of the minimization of the mean.
 constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kMeanDistortionSteps = 20;
 /// Shares of the work at the ends of its parts, for the progress.
@@ -140,11 +138,10 @@ void CurvedOptimizer::find_sizes() {
 
 std::unique_ptr<HighOrderEnergy> CurvedOptimizer::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;  // per direction, as in fits
   std::vector<int> points;
   std::vector<Vec3> boxes;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    points.push_back(std::max(kLeastPoints, points_for_order(space.pattern_order(space.pattern(i)))));
+    points.push_back(std::max(kLeastDistortionPoints, points_for_order(space.pattern_order(space.pattern(i)))));
     boxes.push_back(ideal_boxes_[cells[i]]);
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
@@ -189,11 +186,9 @@ CurvedOptimizer::Part CurvedOptimizer::whole() const {
 
 /// A large mesh moves only around the first of the cells, as many as keep the part small.
 CurvedOptimizer::Part CurvedOptimizer::around(std::span<const Index> cells) const {
-  constexpr int kRings = 2;                // of cells around the given ones, which move with them
-  constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_.space.num_cells()));
   for (std::size_t count = cells.size(); count > 0; count /= 2)
-    if (auto patch = high_order_patch(labels_, mesh_.space, cells.first(count), kRings, most))
+    if (auto patch = high_order_patch(labels_, mesh_.space, cells.first(count), kHighOrderRings, most))
       return make_part(patch->space, patch->cells, patch->nodes, patch->unknowns);
   return whole();
 }

@@ -27,8 +27,6 @@ namespace {
 
 /// Correspondences of this length, as a share of the diagonal, count twice (`ClosestPointEnergy::emphasize_far`).
 constexpr double kFarDistance = 0.002;
-/// Cells with a lower scaled Jacobian do not indicate their wanted size.
-constexpr double kTrustedJacobian = 0.3;
 /// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
 

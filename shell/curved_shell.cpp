@@ -2,6 +2,7 @@
 #include "subvol/shell/curved_shell.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/geometry/self_intersection.h"
@@ -52,8 +53,7 @@ NodeStrands node_strands(const ShellLayers& layers, const ElementSpace& space) {
     strands.clear();
     for (const Index v : vertices)
       if (const Index strand = layers.strand(v); strand != kNoIndex) strands.push_back(strand);
-    std::sort(strands.begin(), strands.end());
-    strands.erase(std::unique(strands.begin(), strands.end()), strands.end());
+    sort_unique(strands);
     for (std::size_t i = 0; i < count; ++i) {
       nodes.strands.insert(nodes.strands.end(), strands.begin(), strands.end());
       nodes.offsets.push_back(nodes.strands.size());
@@ -89,8 +89,7 @@ class CurvedShellCheck {
     };
     for (const auto& [t, s] : found.pairs) add(t, s);
     for (const Index t : found.degenerate) add(t, t);
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    sort_unique(pairs);
     return pairs;
   }
 
@@ -104,8 +103,7 @@ class CurvedShellCheck {
     const MeshTopology& topology = space_.topology();
     for (const auto& pair : intersecting_faces(nodes, ended))
       for (const Index place : pair) add(topology.face(topology.boundary_faces()[place]));
-    std::sort(strands.begin(), strands.end());
-    strands.erase(std::unique(strands.begin(), strands.end()), strands.end());
+    sort_unique(strands);
     return strands;
   }
 
@@ -119,7 +117,6 @@ class CurvedShellCheck {
 /// columns that stay in a plane move in it.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
-  constexpr int kLeastPoints = 5;  // per direction, as in fits
   SparseMap nodes;
   std::vector<Vec3> fixed(mesh.coefficients.size(), Vec3::Zero());
   for (std::size_t i = 0; i < fixed.size(); ++i) {
@@ -145,7 +142,7 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
     }
   }
   const std::vector<int> points(mesh.space.num_cells(),
-                                std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
+                                std::max(kLeastDistortionPoints, points_for_order(mesh.space.max_order())));
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
   energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others

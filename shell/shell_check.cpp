@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/shell_check.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 
@@ -17,11 +18,6 @@ std::vector<int> sheets_to_check(const ShellLayers& layers, CheckedSheets which)
   std::vector<int> sheets(layers.num_sheets());
   std::iota(sheets.begin(), sheets.end(), 0);
   return sheets;
-}
-
-void sort_unique(std::vector<Index>& list) {
-  std::sort(list.begin(), list.end());
-  list.erase(std::unique(list.begin(), list.end()), list.end());
 }
 
 /// Lowers the shares around strands that were held back, so that neighbors differ by at most a quarter.
@@ -59,8 +55,7 @@ ShellFailures ShellCheck::failures(std::span<const Vec3> positions, const std::f
   for (const auto& [t, s] : found.pairs) result.intersecting.push_back({polygon[t], polygon[s]});
   for (const Index t : found.degenerate) result.intersecting.push_back({polygon[t], polygon[t]});
   auto& pairs = result.intersecting;
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   return result;
 }
 

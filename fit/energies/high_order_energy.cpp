@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_sweep.h"
@@ -84,8 +85,7 @@ void HighOrderEnergy::rebuild_groups() {
     group.points_per_direction = key[2];
     if (group.kind != CellKind::hex) {
       for (Index c : cells) group.modes.insert(group.modes.end(), space.modes(c).begin(), space.modes(c).end());
-      std::sort(group.modes.begin(), group.modes.end());
-      group.modes.erase(std::unique(group.modes.begin(), group.modes.end()), group.modes.end());
+      sort_unique(group.modes);
     }
     group.make_tables(space.basis(), rule_);
     group.local_begin = local_size;

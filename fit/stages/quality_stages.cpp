@@ -2,6 +2,7 @@
 #include "subvol/fit/stages/quality_stages.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/solver/levenberg_marquardt.h"
 #include "subvol/mesh/mesh_topology.h"
 
@@ -26,11 +27,9 @@ constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;  // of the lif
 /// Width of the strip of surface that counts as much as a crease, in edges.
 constexpr double kCreaseEdges = 5;
 
-/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; the share of all
-/// cells up to which patches cost less than the whole mesh; and the shares of the goal below which cells are lifted:
-/// the first for which patches are that small.
+/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; and the shares of
+/// the goal below which cells are lifted: the first for which patches are small (`kMostPatchShare`).
 constexpr std::array<int, 3> kPatchRings{1, 3, 2};
-constexpr double kMostPatchShare = 0.4;
 constexpr std::array<double, 4> kPatchShares{1, 0.85, 0.6, 0.3};
 
 /// Exponent of the norm of all costs of a state (`LiftMerit`).
@@ -243,8 +242,7 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
     if (shares[t] > 1 && !triangle_cells_.empty()) state.far_cells.push_back(triangle_cells_[t]);
   }
   surface_->weigh(std::move(factors));
-  std::sort(state.far_cells.begin(), state.far_cells.end());
-  state.far_cells.erase(std::unique(state.far_cells.begin(), state.far_cells.end()), state.far_cells.end());
+  sort_unique(state.far_cells);
   return costs;
 }
 

@@ -67,6 +67,9 @@ struct QualitySchedule {
   void give_surface_more_weight(double factor);
 };
 
+/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
+inline constexpr double kMaxMargin = 0.8;
+
 /// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.
 inline constexpr double kLateFarMargin = 0.9;
 

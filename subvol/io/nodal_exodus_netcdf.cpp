@@ -2,6 +2,7 @@
 // Reads Exodus II, the netCDF files of finite elements. Without netCDF, this is refused.
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/io/exodus_blocks.h"
 #include "subvol/io/nodal_formats.h"
 
@@ -413,8 +414,7 @@ class ExodusParser {
     if (size == 0) return nodes;
     for (const long long node : file_.integers("node_ns" + suffix, size))
       if (node >= 1 && node <= static_cast<long long>(num_nodes_)) nodes.push_back(static_cast<Index>(node - 1));
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    sort_unique(nodes);
     return nodes;
   }
 

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/triangle_geometry.h"
@@ -366,8 +367,7 @@ TriangleMesh boundary_of(const RegionSurface& surface, int region, std::span<con
   std::vector<Index> used;
   for (const Index t : triangles)
     used.insert(used.end(), surface.mesh.triangles[t].begin(), surface.mesh.triangles[t].end());
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
+  sort_unique(used);
   TriangleMesh boundary;
   for (const Index v : used) boundary.positions.push_back(surface.mesh.positions[v]);
   for (const Index t : triangles) {
@@ -495,8 +495,7 @@ TriangleMesh inner_surface(const RegionSurface& surface, std::vector<Index>& tri
 std::vector<std::array<int, 2>> region_pairs(const RegionSurface& surface) {
   std::vector<std::array<int, 2>> pairs;
   for (std::size_t t = 0; t < surface.sides.size(); ++t) pairs.push_back(surface.pair(t));
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   return pairs;
 }
 

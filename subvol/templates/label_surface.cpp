@@ -5,6 +5,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_labels.h"
 
@@ -44,8 +45,7 @@ class LabelSheets {
     if (!can_number_voxels(grid.counts))
       throw InputError("segmentation: it has more than 2^31 - 1 voxels, those of the empty layers around it included");
     values_ = grid.labels;
-    std::sort(values_.begin(), values_.end());
-    values_.erase(std::unique(values_.begin(), values_.end()), values_.end());
+    sort_unique(values_);
     std::erase(values_, kOutside);
     if (values_.empty()) throw InputError("segmentation: no voxel has a label above 0");
   }
@@ -114,8 +114,7 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
   for (int label = 0; label <= labels.num_regions() && !stop_.is_stopped(); ++label) {
     std::vector<int>& of_this = of_label[label];
     for (int& c : of_this) c = sets.of(c);
-    std::sort(of_this.begin(), of_this.end());
-    of_this.erase(std::unique(of_this.begin(), of_this.end()), of_this.end());
+    sort_unique(of_this);
     if (keeps_regions && label != kOutside && !of_this.empty()) {
       const auto largest =
           std::max_element(of_this.begin(), of_this.end(), [&](int a, int b) { return size[a] < size[b]; });
