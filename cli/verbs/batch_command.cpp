@@ -32,7 +32,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// --- What the verbs of a batch accept, from the parser ----------------------------------------------------------------
+// --- What the verbs of a batch accept, from the parser --------------------------------------------------------------
 
 /// Finds verbs and their options in the description of the program.
 class ParserVerbs {
@@ -68,7 +68,7 @@ class ParserVerbs {
   std::map<std::string, BatchVerb> verbs_;
 };
 
-// --- batch --------------------------------------------------------------------------------------------------------------
+// --- batch ----------------------------------------------------------------------------------------------------------
 
 struct BatchArguments {
   std::vector<std::string> words, rows, outputs;
@@ -142,7 +142,7 @@ int run_batch_verb(BatchArguments& arguments, ParserVerbs& parser_verbs) {
   return all_valid ? kDone : kNotConverged;
 }
 
-// --- batch report -------------------------------------------------------------------------------------------------------
+// --- batch report ---------------------------------------------------------------------------------------------------
 
 struct BatchReportArguments {
   std::vector<std::string> folders, before;
@@ -238,7 +238,7 @@ int run_batch_report(const BatchReportArguments& arguments) {
   return kDone;
 }
 
-// --- batch merge --------------------------------------------------------------------------------------------------------
+// --- batch merge ----------------------------------------------------------------------------------------------------
 
 struct MergeArguments {
   std::vector<std::string> folders;
@@ -261,7 +261,7 @@ int run_batch_merge(const MergeArguments& arguments) {
   return kDone;
 }
 
-// --- Options ------------------------------------------------------------------------------------------------------------
+// --- Options --------------------------------------------------------------------------------------------------------
 
 void add_report(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("report", "Show the results of a batch as a page");

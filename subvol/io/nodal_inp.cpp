@@ -142,8 +142,7 @@ class InpParser {
   }
   std::int64_t label(const std::string& text, const char* what) const { return label(text, what, line_->instance); }
 
-  // --- Nodes and elements
-  // ---------------------------------------------------------------------------------------------
+  // --- Nodes and elements --------------------------------------------------------------------------------------------
 
   void open_nodes() {
     if (const std::string system = line_->parameter("SYSTEM"); !system.empty() && upper_case(system) != "R")
@@ -227,8 +226,7 @@ class InpParser {
     element_open_ = element_nodes_.size() < end;
   }
 
-  // --- Sets
-  // -----------------------------------------------------------------------------------------------------------
+  // --- Sets ----------------------------------------------------------------------------------------------------------
 
   /// The instance whose sets and numbers a line of a set or a surface names.
   const InpInstance* instance_of_set() const {
@@ -310,8 +308,7 @@ class InpParser {
                       place_});
   }
 
-  // --- Building the mesh
-  // ----------------------------------------------------------------------------------------------
+  // --- Building the mesh ---------------------------------------------------------------------------------------------
 
   /// Without cells, shells are a surface, whose groups are the sets of *ELEMENT.
   void build_shells() {
