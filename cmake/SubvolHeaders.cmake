@@ -44,13 +44,13 @@ set(entry_points
   subvol/templates/pillow.h
   subvol/templates/refine.h
   subvol/templates/region_template.h
-  subvol/templates/template_edit.h
   subvol/templates/vertex_merge.h
   # Fits, optimization, checks
   fit/automatic_fit.h
   fit/certificate/certificate.h
   fit/elements/high_order_mesh.h
   fit/energies/distortion_kind.h
+  fit/geometry/closest_point.h
   fit/geometry/surface_distance.h
   fit/high_order_fit.h
   fit/mesh_check.h

@@ -8,19 +8,18 @@
 
 namespace subvol {
 
-/// The course of a fit: one node "surface" that passes through the states one after another and ends as the result.
+/// Returns a scene of the course of a fit: its node "surface" passes through the states one after another and ends as
+/// the result, the limit surface of a control cage. The cage is refined at least once and at most 4 times, as long as
+/// it stays below 20,000 quads.
 ///
 /// Each state is a shape (`SceneNode::shapes`) with its own normals; an edge at which faces of the result meet at more
 /// than `crease_angle_degrees` is shaded sharp in all shapes. There is no wireframe: viewers fail at animated lines.
 /// InputError: a state whose number of positions differs from the mesh's; options out of range.
-
-/// The limit surface of a control cage, refined at least once and at most 4 times, as long as it stays below 20 000
-/// quads.
 Scene animation_scene(const VolumeMesh& cage, std::span<const FitState> states,
                       const SurfaceSceneOptions& options = {});
 
-/// The boundary of a high-order mesh, each face cut into 2 * (largest order) intervals per side. The positions of
-/// states are coefficients.
+/// Does the same for the boundary of a high-order mesh, each face cut into 2 * (largest order) intervals per side. The
+/// positions of states are coefficients.
 Scene animation_scene(const HighOrderMesh& mesh, std::span<const FitState> states,
                       const SurfaceSceneOptions& options = {});
 

@@ -27,7 +27,8 @@ void append_group_fields(std::string& text, const FaceGroups& groups);
 ///
 /// Cell data `group` holds the number of each face's group, 0 for none, and `cell` the cell behind it; point data
 /// `vertex` holds the number of each point in the volume mesh. The field data `group_numbers` and `group_names` list
-/// the groups; the names are UInt8, in UTF-8, each ended by 0, since meshio stops at texts. A negative number, or 0, of a group is replaced by the lowest free positive one.
+/// the groups; the names are UInt8, in UTF-8, each ended by 0, since meshio stops at texts. A negative number, or 0, of
+/// a group is replaced by the lowest free positive one.
 /// InputError: no faces, indices out of range, coordinates that are not finite, lists of wrong length.
 std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin = {});
 

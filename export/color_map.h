@@ -5,7 +5,7 @@
 
 namespace subvol {
 
-/// Color of a scaled Jacobian: viridis from 0 (dark violet) to 1 (yellow), vermilion for every value <= 0.
+/// Returns the color of a scaled Jacobian: viridis from 0 (dark violet) to 1 (yellow), vermilion for every value <= 0.
 ///
 /// The map is even in lightness and readable with any color vision; vermilion does not occur in viridis, so that an
 /// inverted cell cannot be mistaken for a poor one. Values above 1 count as 1; NaN is vermilion.

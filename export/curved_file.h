@@ -10,8 +10,8 @@
 
 namespace subvol {
 
-/// True if a file is a .vtu with the exact map of its cells, for `read_high_order`, as subvol writes it: not after
-/// another program has rewritten it.
+/// Returns true if a file is a .vtu with the exact map of its cells, for `read_high_order`, as subvol writes it: not
+/// after another program has rewritten it.
 bool holds_exact_map(const std::filesystem::path& path);
 
 /// Returns the cells of another program as one high-order mesh with the Legendre basis: the same polynomials, up to

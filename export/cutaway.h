@@ -11,8 +11,8 @@ namespace subvol {
 /// Selects the cells to remove so that the inside becomes visible: those whose center lies beyond a plane perpendicular
 /// to an axis.
 struct CutPlane {
-  static constexpr int kShortest = -1;
-  int axis = kShortest;  ///< 0, 1, 2, or the axis along which the mesh is shortest, which gives the largest section
+  static constexpr int kShortest = -1;  ///< stands for the axis along which the mesh is shortest
+  int axis = kShortest;                 ///< 0, 1, 2, or kShortest, which gives the largest section
   double share = 0.5;    ///< position between the lowest and the highest cell center, in (0, 1)
 };
 
@@ -22,8 +22,8 @@ struct CellRegions {
   std::vector<Index> of_cell;  ///< for each cell a place in `regions`
 };
 
-/// The inside of a mesh: its cells up to a plane, as whole cells, colored by their quality, or by region if there are
-/// several.
+/// Returns a scene of the inside of a mesh: its cells up to a plane, as whole cells, colored by their quality, or by
+/// region if there are several.
 ///
 /// Nodes: "surface" (what remains of the boundary, shaded smoothly; a vertex has the least quality around it), "cut"
 /// (the faces that the removed cells uncover, each separate and in the color of its own cell) and "wireframe" (the

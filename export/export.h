@@ -32,7 +32,7 @@ struct SurfaceSceneOptions {
   FaceGroups face_groups{};
 };
 
-/// The limit surface of a control cage, colored by the quality of the cells below it.
+/// Returns a scene of the limit surface of a control cage, colored by the quality of the cells below it.
 ///
 /// Nodes: "surface" (normals, COLOR_0 by `quality_color`, _SCALED_JACOBIAN, quads as consecutive pairs of triangles)
 /// and "wireframe" (the cage's boundary edges as curves). A vertex has the least quality of the patches around it.
@@ -57,7 +57,8 @@ std::vector<double> patch_quality(const VolumeMesh& cage, const TessellatedSurfa
 double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options);
 double chord_length(const HighOrderPatches& patches, const SurfaceSceneOptions& options);
 
-/// The curved boundary of a high-order mesh, colored by the quality of its cells, with each boundary edge as a curve.
+/// Returns a scene of the curved boundary of a high-order mesh, colored by the quality of its cells, with each boundary
+/// edge as a curve.
 ///
 /// Nodes, colors and attributes are as for a limit surface. Normals are those of the map, averaged at each vertex
 /// except where faces meet at more than `crease_angle_degrees`.
@@ -66,11 +67,12 @@ double chord_length(const HighOrderPatches& patches, const SurfaceSceneOptions& 
 Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima,
                     const SurfaceSceneOptions& options = {});
 
-/// The curved boundary as triangles within `max_chord_percent` of its box's diagonal, for measurements. InputError: as
-/// above.
+/// Returns the curved boundary as triangles within `max_chord_percent` of its box's diagonal, for measurements.
+/// InputError: as above.
 CurvedBoundary curved_boundary(const HighOrderMesh& mesh, double max_chord_percent);
 
-/// The boundary of a volume mesh with its flat faces, colored by the quality of the boundary cells.
+/// Returns a scene of the boundary of a volume mesh with its flat faces, colored by the quality of the boundary cells.
+/// InputError: no cells; options out of range.
 Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options = {});
 
 /// A surface that is drawn as a separate node.
@@ -82,12 +84,14 @@ struct SceneSheet {
   std::vector<std::array<Index, 2>> wires{};  ///< edges to draw, by vertex; empty: the edges of all polygons
 };
 
-/// Several sheets with their flat faces, and one "wireframe" with the edges of all. `color_map` names what the shades
-/// show. InputError: no sheets, arrays whose length is not the number of vertices.
+/// Returns a scene of several sheets with their flat faces, and one "wireframe" with the edges of all. `color_map`
+/// names what the shades show. InputError: no sheets, arrays whose length is not the number of vertices.
 Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& color_map,
                   const SurfaceSceneOptions& options = {});
 
-/// Polygons as they are. face_quality: one scaled Jacobian per face, or empty (no colors then).
+/// Returns a scene of polygons as they are.
+///
+/// face_quality  one scaled Jacobian per face, or empty (no colors then). InputError: another number of them.
 Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_quality = {},
                     const SurfaceSceneOptions& options = {});
 

@@ -39,7 +39,7 @@ GroupedFaces grouped_faces(const VolumeMesh& mesh);
 GroupedFaces grouped_faces(const LagrangeMesh& cells, const MeshTopology& topology, const VolumeFaceGroups& groups);
 
 /// Returns the points of a triangle or quad of an order >= 1 in Gmsh's order: numbers of steps from the first corner
-/// towards the second, and towards the last.
+/// toward the second, and toward the last.
 std::vector<std::array<int, 2>> gmsh_face_lattice(std::size_t num_corners, int order);
 
 }  // namespace subvol::internal

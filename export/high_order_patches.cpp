@@ -16,7 +16,7 @@ namespace subvol {
 using namespace internal;
 namespace {
 
-constexpr double kVanishes = 1e-13;
+constexpr double kVanishes = 1e-13;  // relative to the largest coefficient
 
 /// A point of a patch in the face's cell: the corners of the patch are one corner of the face, two midpoints of edges,
 /// and the center.

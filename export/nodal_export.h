@@ -10,7 +10,7 @@
 
 namespace subvol {
 
-/// True for the extensions whose files are made from a NodalMesh: .inp, .bdf, .mfem, .e, .exo and .xdmf.
+/// Returns true for the extensions whose files are made from a NodalMesh: .inp, .bdf, .mfem, .e, .exo and .xdmf.
 bool is_nodal_output(const std::string& extension);
 
 /// Returns the bytes of such a file. InputError: another extension, and as the writers of these formats.

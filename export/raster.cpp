@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kSamples = 2;  ///< per pixel, in each direction
 constexpr LinearColor kGray{0.35, 0.40, 0.45, 1};
-constexpr double kAmbient = 0.3;
+constexpr double kAmbient = 0.3;     // share of the light that comes from everywhere
 constexpr double kWireShade = 0.35;  ///< factor on the surface's color
 
 double srgb(double linear) {

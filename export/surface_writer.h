@@ -8,7 +8,7 @@
 
 namespace subvol {
 
-/// True for the extensions that `surface_bytes` knows: .stl, .ply, .vtp and .3mf.
+/// Returns true for the extensions that `surface_bytes` knows: .stl, .ply, .vtp and .3mf.
 bool is_surface_output(const std::string& extension);
 
 /// Returns a surface as a file. Equal surfaces give equal bytes.

@@ -19,8 +19,8 @@ void append_vector(std::string& text, const Vec3& vector, const char* separator)
 /// The extension with its dot, in lower case.
 std::string lower_case_extension(const std::filesystem::path& path);
 
-/// Throws InputError, naming `what`, unless there are faces, each of at least three corners, all in range, all positions
-/// are finite, and the groups of the faces are in range.
+/// Throws InputError, naming `what`, unless there are faces, each of at least three corners, all in range, all
+/// positions are finite, and the groups of the faces are in range.
 void require_polygons(const PolygonMesh& mesh, const std::string& what);
 
 }  // namespace subvol::internal

@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_driver.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
@@ -27,6 +28,7 @@ double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kA
 }  // namespace
 
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
+  // The share for a grid of cubes. For a grid through planes, it is smaller in proportion to the shortest edge.
   constexpr double kLeast = 0.1;
   constexpr double kFlat = 0.4;  // lines of grids through planes are no closer than this share of the others
   if (grid.num_cells() == 0) return 0;
@@ -63,8 +65,8 @@ std::function<bool(double)> AutomaticDriver::begin_template() {
   begin_part(kTemplatePortion, 1);
   return [this](double fraction) {
     runner_.work().set(fraction);
-    return !runner_.is_to_end() &&
-           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
+    return !runner_.is_to_end() && (!options_.control.progress ||
+                                    options_.control.progress({"template", 0, 0, fraction, runner_.work().share()}));
   };
 }
 
@@ -114,7 +116,7 @@ bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
 }
 
 void AutomaticDriver::sample_target(std::size_t faces) {
-  constexpr std::size_t kSamplesPerFace = 4, kMostSamplesPerFace = 8;
+  constexpr std::size_t kSamplesPerFace = 4, kMostSamplesPerFace = 8;  // of the target, for each boundary face
   target_.sample(kSamplesPerFace * faces, 1, kMostSamplesPerFace * faces);
 }
 
@@ -161,8 +163,7 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
   const std::vector<double> least = measure_quality(mesh_).cell_minima;
   for (std::size_t c = 0; c < least.size(); ++c)
     if (least[c] < hopeless_quality(options_)) cells.push_back(static_cast<Index>(c));
-  std::ranges::sort(cells);
-  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  sort_unique(cells);
   return cells;
 }
 
@@ -170,7 +171,7 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
 /// cells farther out, until there are none: there the cells take the room that they want, as on the grid. Returns false
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
-  constexpr int kMostRounds = 12, kSteps = 6;
+  constexpr int kMostRounds = 12, kSteps = 6;  // the steps of each round
   constexpr int kFruitless = 4;  // rounds without fewer hopeless cells: no success was seen after two
   constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
@@ -213,13 +214,13 @@ bool AutomaticDriver::relax_last_trial() {
 }
 
 bool AutomaticDriver::polish() {
-  constexpr double kStep = 0.05;
+  constexpr double kStep = 0.05;  // by which the least scaled Jacobian asked for rises from one lift to the next
   // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
   constexpr double kGrowth = 1.2, kLeast = 0.02;
   // If more than this share of the cells is below a quality, lifting them moves most of the mesh. A vertex of a cage
   // moves more cells.
   constexpr double kMostPoor = 0.1, kMostPoorOfCage = 0.05;
-  constexpr int kPointsPerDirection = 3;
+  constexpr int kPointsPerDirection = 3;  // the corners and the points half-way between them
   if (!is_good() || !is_present_best() || last_polished_ == result_.chosen) return true;
   last_polished_ = result_.chosen;
   AutomaticFitTrial trial = best();

@@ -42,10 +42,7 @@ class AutomaticDriver {
   /// target: any that a `FitTarget` is made from.
   template <class Target>
   AutomaticDriver(const AutomaticFitOptions& options, const Target& target)
-      : options_(checked_options(options)),
-        target_(target),
-        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-                 options.cancelled, options.log}) {}
+      : options_(checked_options(options)), target_(target), runner_(options.control) {}
   ~AutomaticDriver() = default;
 
   const AutomaticFitTrial& best() const { return result_.trials[result_.chosen]; }
@@ -92,7 +89,7 @@ class AutomaticDriver {
   QualitySchedule aiming_at_distance(QualitySchedule schedule) const {
     return aiming_at(aimed_max_percent(), std::move(schedule));
   }
-  /// The largest distance to aim at, in per cent of the diagonal: at most the one allowed.
+  /// The largest distance to aim at, in percent of the diagonal: at most the one allowed.
   virtual double aimed_max_percent() const { return options_.max_tolerance_percent; }
   /// Fits the present mesh, refines it so many times, fitting it each time, and judges it. If a cage is made, the last
   /// mesh is fitted by the vertices of the one before.

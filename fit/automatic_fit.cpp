@@ -151,9 +151,11 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
 
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
+  // A grid is first asked for this share of the cells allowed, since pads add cells; after a grid that was too large,
+  // the next one is asked for kLess of what would have fitted.
   constexpr double kRoomForPads = 0.5, kLess = 0.95;
   constexpr double kEnough = 0.8;  // share of the edges that must find a path, or a finer grid is worth more than a fit
-  constexpr int kTries = 3;
+  constexpr int kTries = 3;        // grids
   double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);

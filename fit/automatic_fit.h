@@ -5,6 +5,7 @@
 #include "subvol/fit/features/not_followed.h"
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/target/feature_size.h"
 #include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -14,15 +15,10 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <vector>
 
 namespace subvol {
-
-namespace internal {
-class StageLog;
-}
 
 /// Distances that an automatic fit aims at, in percent of the diagonal.
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
@@ -33,8 +29,8 @@ inline constexpr double kAutomaticVolumePercent = 0.1;
 /// A result that is this many times farther from the target than the largest distance aimed at is far off, and its stop
 /// reason says so.
 inline constexpr double kFarOffFactor = 2;
-/// So is one that does not follow a sharp edge longer than this, in percent of the diagonal, or that misses a feature by
-/// more than its radius, if the radius is at least this, in percent of the diagonal: noise of a triangulation looks
+/// So is one that does not follow a sharp edge longer than this, in percent of the diagonal, or that misses a feature
+/// by more than its radius, if the radius is at least this, in percent of the diagonal: noise of a triangulation looks
 /// like smaller ones.
 inline constexpr double kLongEdgePercent = 10, kLostFeaturePercent = 0.2;
 /// So is one of which a region's volume differs by this many times what is aimed at.
@@ -50,6 +46,7 @@ inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 300
 /// than a minute.
 inline constexpr std::size_t kMostAutomaticCells = 100000;
 
+/// Options of `fit_automatically` and `fit_regions`.
 struct AutomaticFitOptions {
   /// Number of cells that the result may have, at least kLeastTemplateCells; more only if no smaller template has the
   /// solid's topology. Empty: as few as make the fit good, of the counts above.
@@ -63,18 +60,13 @@ struct AutomaticFitOptions {
   /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth. If
   /// not set, and edges are followed (`crease_angle_degrees`), this is tried if a result without it misses groups.
   bool keeps_groups = false;
-  /// The result is a subdivision volume: a control mesh, the cage, whose vertices are the only unknowns, and the mesh
-  /// that it is subdivided to once. `cells` are then those of that mesh. Only for targets of one region.
+  /// The result is a subdivision volume: a control mesh, the cage, whose vertices are the degrees of freedom, and the
+  /// mesh that it is subdivided to once. `cells` are then those of that mesh. Only for targets of one region.
   bool makes_cage = false;
   /// Number of times that the template of a cage is subdivided to the mesh, in [1, 6]; once if edges are followed.
   int levels = 1;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
-  int max_iterations = 0;                            ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;                     ///< 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
-  internal::StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  SolveControl control{};
   bool keep_states = false;           ///< fills AutomaticFitResult::states
 };
 
@@ -112,6 +104,7 @@ struct AutomaticFitTrial {
   double merit = 0;                               ///< 0: all aims are reached; lower is better
 };
 
+/// The best trial of an automatic fit, and what was tried.
 struct AutomaticFitResult {
   VolumeMesh cage;  ///< with its tags; its limit surface is the fitted surface; empty unless asked for
   VolumeMesh mesh;  ///< hexes, with tags on the creases that follow edges of the target
@@ -202,7 +195,8 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
 ///
 ///   min(3, max(0, largest difference of a region's volume / 0.1 % - 1))
 ///
-/// InputError: options out of range; as `topology_of`; regions whose topology no grid reproduces.
+/// InputError: options out of range; a region whose boundary bounds no solid (`solid_boundary`); regions whose topology
+/// no grid reproduces.
 AutomaticFitResult fit_regions(const RegionSurface& target, const AutomaticFitOptions& options = {});
 
 }  // namespace subvol

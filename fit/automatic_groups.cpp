@@ -20,8 +20,8 @@ constexpr double kFirstShare = 0.6;
 
 /// Returns the options of one of two fits, whose progress goes from one share to another.
 AutomaticFitOptions with_progress(AutomaticFitOptions options, double from, double to) {
-  if (options.progress)
-    options.progress = [tell = options.progress, from, to](FitProgress progress) {
+  if (options.control.progress)
+    options.control.progress = [tell = options.control.progress, from, to](FitProgress progress) {
       progress.fraction = from + (to - from) * progress.fraction;
       return tell(progress);
     };
@@ -93,8 +93,9 @@ AutomaticFitResult fit_for_groups(const TriangleMesh& target, const AutomaticFit
   if (missed == 0) return first;
   AutomaticFitOptions left = with_progress(options, kFirstShare, 1);
   left.keeps_groups = true;
-  if (options.time_limit_seconds > 0)
-    left.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - first.report.seconds.front().second);
+  if (options.control.time_limit_seconds > 0)
+    left.control.time_limit_seconds =
+        std::max(1e-3, options.control.time_limit_seconds - first.report.seconds.front().second);
   AutomaticFitResult second;
   try {
     second = fit(true, left);

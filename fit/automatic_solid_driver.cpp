@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_solid_driver.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/signed_features.h"
 #include "subvol/fit/fits/flat_faces.h"
@@ -74,8 +75,8 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOpti
 }
 
 std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::size_t cells) {
-  constexpr int kTries = 3;
-  constexpr double kLess = 0.97;
+  constexpr int kTries = 3;       // grids
+  constexpr double kLess = 0.97;  // after a grid that was too large, share of what would have fitted
   double asked = kRoomForTemplates * static_cast<double>(cells);
   std::optional<AutoTemplate> smallest;
   for (int trial = 1;; ++trial) {
@@ -209,7 +210,7 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
 }
 
 std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
-  constexpr double kMeets = 1;
+  constexpr double kMeets = 1;  // a cell that meets another one is worse than any cell of poor quality
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
     faults.push_back(std::max(0.0, kAcceptableQuality - least));
@@ -247,8 +248,7 @@ std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   std::vector<Fault> faults;
   if (meets_itself(best())) {
     std::vector<Index> meeting = cells_that_meet(result_.mesh);
-    std::ranges::sort(meeting);
-    meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());
+    sort_unique(meeting);
     for (const Index c : meeting) faults.push_back({c});
   }
   const std::vector<double> least = measure_quality(result_.mesh).cell_minima;

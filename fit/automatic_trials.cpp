@@ -3,6 +3,7 @@
 
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/templates/auto_template.h"
 
@@ -33,7 +34,7 @@ bool loses_feature(const AutomaticFitTrial& trial) {
 }  // namespace
 
 AutomaticFitOptions checked_options(AutomaticFitOptions options) {
-  constexpr double kLeastQuality = 0.1;
+  constexpr double kLeastQuality = 0.1;  // aims below it are taken as this one: shares of the aim need a divisor
   const auto in_range = [](const char* name, double value, double low, double high) {
     require_in_range("AutomaticFitOptions", name, value, low, high);
   };
@@ -41,15 +42,15 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  check_control("AutomaticFitOptions", options.control);
   in_range("levels", options.levels, 1, 6);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (options.cells) in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
   options.quality = std::max(options.quality, kLeastQuality);
   return options;
 }
 
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
+  // Weight of the share of edges that are not followed closely, and the most that each other miss counts.
   constexpr double kEdgeWeight = 3, kMostMiss = 3;
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
   const double least_acceptable = std::min(kAcceptableQuality, options.quality);

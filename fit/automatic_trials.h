@@ -14,9 +14,6 @@
 
 namespace subvol::internal {
 
-/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
-inline constexpr double kMaxMargin = 0.8;
-
 /// No other template is tried either if the quality is what keeps a trial from being good, and reaches this share of
 /// the goal: larger templates have the same angles at sharp edges and irregular vertices.
 inline constexpr double kEnoughQuality = 0.85;

@@ -11,6 +11,8 @@
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
+#include "subvol/fit/stages/quality_patches.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
@@ -40,8 +42,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   in_range("order", options.order, 1, kMaxOrder);
   if (options.lambda_close) in_range("lambda_close", *options.lambda_close, 1e-9, 1e9);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  check_control("HighOrderFitOptions", options.control);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   in_range("quality", options.quality, 0, kMostQuality);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
@@ -63,8 +64,7 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
       template_(checked_template(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
-               options.log}) {
+      runner_(options.control, options.solver) {
   target_.normalization.take_in(template_);
   mesh_.coefficients = template_.positions;
   creases_ = creases_along_target(target_, crease_rule(), template_);
@@ -84,22 +84,23 @@ void HighOrderDriver::look_over_template() {
 /// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
 /// chord errors to be negligible; fewer on surfaces of many faces, where chord errors matter less.
 int HighOrderDriver::sample_intervals(int order) const {
-  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
-  constexpr double kMostTriangles = 60000;
+  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;  // along an edge of a face
+  // Number of triangles of all faces beyond which edges get no more intervals than they need.
+  constexpr double kMostFittedTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const double triangles = 2 * static_cast<double>(target_.surface.num_details());
   const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
-  const int affordable = static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)));
+  const int affordable = static_cast<int>(std::sqrt(kMostFittedTriangles / (2 * faces)));
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
 }
 
 /// Returns the number of intervals for measuring: more than for the fit, up to about twice as many, if there are not
 /// too many triangles.
 int HighOrderDriver::measured_intervals() const {
-  constexpr double kMostTriangles = 1e6;
+  constexpr double kMostMeasuredTriangles = 1e6;  // of all faces together, to bound the time of distances
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const int own = sample_intervals(order_);
-  return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)))));
+  return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostMeasuredTriangles / (2 * faces)))));
 }
 
 bool HighOrderDriver::end_for_memory(const std::string& why) {
@@ -137,13 +138,12 @@ BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const 
 
 std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;
   std::vector<int> points(space.num_cells());
   std::vector<Vec3> boxes(space.num_cells());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t c = cells.empty() ? i : static_cast<std::size_t>(cells[i]);
-    points[i] = std::max(
-        {kLeastPoints, points_for_order(space.pattern_order(space.pattern(i))), stays_dense_ ? points_[c] : 0});
+    points[i] = std::max({kLeastDistortionPoints, points_for_order(space.pattern_order(space.pattern(i))),
+                          stays_dense_ ? points_[c] : 0});
     boxes[i] = ideal_boxes_[c];
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
@@ -194,7 +194,7 @@ void HighOrderDriver::begin_stage(const Stage& stage) {
   lambda_ = stage.lambda;
   mean_.reset();
   if (order_ == order_in_progress_) return;
-  constexpr double kExpectedSteps = 20;
+  constexpr double kExpectedSteps = 20;  // of an order, for the progress
   order_in_progress_ = order_;
   // An order takes about a quarter of the work of twice the order.
   const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
@@ -216,14 +216,12 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
 
 /// The patch is a part of the problem of `run_stage`, with the same weights.
 bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
-  constexpr int kRings = 2;
-  constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   constexpr std::size_t kMostMovedAsWhole = 3000;  // moving all of so many cells takes seconds, and helps more
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));
   std::optional<HighOrderPatch> patch;
   if (options_.correspondence == Correspondence::closest)
     for (std::size_t count = cells.size(); count > 0 && !patch; count /= 2) {
-      patch = high_order_patch(template_, mesh_.space, cells.first(count), kRings, most);
+      patch = high_order_patch(template_, mesh_.space, cells.first(count), kHighOrderRings, most);
       if (template_.num_cells() <= kMostMovedAsWhole) break;
     }
   if (!patch) return run_stage(stage);

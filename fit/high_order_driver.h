@@ -65,8 +65,8 @@ class HighOrderDriver : protected StagedFit {
                      const Stage& stage) const;
   /// Minimizes with the present orders and settings, and adds the stage to the report.
   bool run_stage(const Stage& stage);
-  /// Does the same, but moves only the surroundings of some cells, those that need it most first. If these would be more
-  /// than 40 % of the mesh, a small mesh moves as a whole, and a large one around the first of the cells.
+  /// Does the same, but moves only the surroundings of some cells, those that need it most first. If these would be
+  /// more than 40 % of the mesh, a small mesh moves as a whole, and a large one around the first of the cells.
   bool run_stage_around(std::span<const Index> cells, const Stage& stage);
   /// Does the same for a stage of the schedule, and remembers the state before it in `starts_`.
   bool run_next_stage(const Stage& stage);
@@ -75,14 +75,14 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh measured_boundary() const;
   double measured_mean();
   bool meets_tolerance();
-  /// Returns the largest difference of a region's volume from the target's, in per cent; 0 if the target has no
+  /// Returns the largest difference of a region's volume from the target's, in percent; 0 if the target has no
   /// regions.
   double volume_percent() const;
   /// Measures the distances of the creases; nothing if none follows a curve.
   std::optional<CreaseDistance> measured_creases() const;
   /// moved_only  the state before the last stage had no intersecting pairs, so only what that stage moved is searched.
   std::optional<Outcome> measured_outcome(bool moved_only);
-  /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal, the
+  /// Returns the cells at the boundary that are farther from the target than this, in percent of the diagonal, the
   /// farthest first.
   std::vector<Index> far_cells(double percent) const;
   std::optional<std::size_t> intersecting_pairs() override;

@@ -32,21 +32,21 @@ namespace {
 /// justifies a raise.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 /// A place is far if its distance exceeds kFarShare times the mean and kNearPercent of the diagonal, a tenth of the
-/// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At first,
-/// a place at kFirstFarLength times the mean counts twice.
+/// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At
+/// first, a place at kFirstFarLength times the mean counts twice.
 constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
-/// Mean distances below this, in per cent of the diagonal, and largest ones below kNearPercent count alike: a quarter
+/// Mean distances below this, in percent of the diagonal, and largest ones below kNearPercent count alike: a quarter
 /// of the mean that automatic fits aim at.
 constexpr double kNearMeanPercent = 0.005;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
-constexpr int kMostDraws = 4, kDrawSteps = 20;
+constexpr int kMostDraws = 4, kDrawSteps = 20;  // draws toward the target in a round, and the steps of each
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
 constexpr double kFairScaledJacobian = 0.5;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
 constexpr int kMostImprovements = 3;
 constexpr double kMostDistanceGrowth = 1.2;
-/// Largest distance that may be caused in any case, in per cent of the diagonal: what automatic fits aim at.
+/// Largest distance that may be caused in any case, in percent of the diagonal: what automatic fits aim at.
 constexpr double kAllowedMaxPercent = 0.5;
 
 /// The high-order fit: its sequence of orders, and the improvement of the worst places.
@@ -206,7 +206,7 @@ bool HighOrderFit::run_adaptive_orders() {
 /// their volumes; if nothing is missed, only undoes the rise of lambda by unfolding. A stage that is interrupted or
 /// leaves more than `pairs` self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
-  constexpr double kLeastShare = 1e-3;
+  constexpr double kLeastShare = 1e-3;  // of `lambda_close`: ten halvings
   const bool has_volumes = volume_percent() <= kAutomaticVolumePercent;
   const bool is_asked = options_.tolerance_percent || !has_volumes;
   const double least = (is_asked ? kLeastShare : 1) * schedule_.lambda_close;

@@ -3,9 +3,9 @@
 
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/subdivision_fit.h"
 
-#include <functional>
 #include <optional>
 
 namespace subvol {
@@ -16,6 +16,7 @@ namespace subvol {
 /// gets past them.
 inline constexpr double kLambdaOfOrders = 0.05, kCurvingLambda = 0.0025;
 
+/// Options of `fit_high_order`.
 struct HighOrderFitOptions {
   int order = 4;                                 ///< order of the finished mesh, 1..kMaxOrder
   /// Legendre modes are polynomials, which .vtu and .msh store exactly. Fourier modes (paper: section 3.2) are written
@@ -24,7 +25,7 @@ struct HighOrderFitOptions {
   /// p-adaptive: orders are raised, up to `order`, only where the energy gains from it and only until the tolerance is
   /// met.
   bool adaptive = false;
-  /// Lambda is lowered until the mean distance is at most this, in per cent of the diagonal; > 0. It is also lowered
+  /// Lambda is lowered until the mean distance is at most this, in percent of the diagonal; > 0. It is also lowered
   /// until the volumes of the target's regions are within `kAutomaticVolumePercent`.
   std::optional<double> tolerance_percent;
   std::optional<double> lambda_close;  ///< lambda of the last stage, > 0; empty: one of the two above
@@ -43,17 +44,12 @@ struct HighOrderFitOptions {
   /// little elsewhere.
   bool improve_worst_places = true;
   double quality = kUsualQuality;                ///< least scaled Jacobian to aim at then, in [0, 0.8]; 0: none
-  int max_iterations = 0;                        ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;                 ///< 0: no limit
+  SolveControl control{};
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
-  /// Supplies the results of earlier minimizations and records new ones; null: no log.
-  internal::StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills HighOrderFitResult::states
 };
 
+/// The curved mesh, and how the fit went.
 struct HighOrderFitResult {
   HighOrderMesh mesh;
   FitReport report;

@@ -16,6 +16,9 @@
 
 namespace subvol::internal {
 
+/// Rings of cells around the given ones that move with them.
+inline constexpr int kHighOrderRings = 2;
+
 /// A part of a mesh of curved cells around a few of them: everything outside is held fixed. The lists of numbers of the
 /// mesh are ascending, except `nodes`.
 struct HighOrderPatch {
@@ -44,8 +47,8 @@ HighOrderMesh cells_of(const HighOrderMesh& mesh, std::span<const Index> cells);
 /// Makes the minimization over the unknowns of a patch.
 ///
 /// volume   energy of `patch.space`, which the problem refers to.
-/// samples  of the boundary of the whole mesh.  surface  E_S on them, at least `assign_target` at these coefficients: the
-///          part of the target that corresponds to the patch there goes with it.
+/// samples  of the boundary of the whole mesh.  surface  E_S on them, at least `assign_target` at these coefficients:
+///          the part of the target that corresponds to the patch there goes with it.
 FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coefficients,
                          std::unique_ptr<VolumeTerm> volume, const BoundarySamples& samples,
                          const ClosestPointEnergy& surface, double lambda);

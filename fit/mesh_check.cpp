@@ -4,6 +4,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -145,8 +146,7 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   check.num_degenerate_boundary_triangles = found.degenerate.size();
   auto& faces = check.intersecting_faces;
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
-  std::sort(faces.begin(), faces.end());
-  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  sort_unique(faces);
   if (check.num_boundary_components > 1 && faces.empty())
     check.parts_inside_solids = parts_facing_inward(triangles, progress, check);
   if (check.ended_early) return;
@@ -167,7 +167,7 @@ MeshCheck count_cells(const VolumeMesh& mesh) {
 template <class Certify, class Position>
 std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify,
                                         const Position& position) {
-  constexpr std::size_t kMostWitnesses = 10;
+  constexpr std::size_t kMostWitnesses = 10;  // of inverted cells in a report
   std::vector<InversionWitness> result;
   for (const Index c : quality.certificate.invalid_cells) {
     if (result.size() == kMostWitnesses) break;

@@ -28,11 +28,12 @@ enum class QuadTriangles {
   diagonal   ///< `triangulate`: two per quad
 };
 
+/// Options of `check_mesh`.
 struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< for the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< as in `SurfaceDistanceOptions`
-  bool audits_subdivision = true;  ///< tell what would degrade a subdivision of the mesh
+  bool audits_subdivision = true;  ///< reports what would degrade a subdivision of the mesh
   CellLabels labels{};  ///< of curved cells, whose mesh does not hold them; empty: one region
   /// Called before each part with its name: "quality", "topology", "self-intersections", "nesting" if
   /// the boundary has several parts, and, if there are a target and a boundary, "distance". Also called repeatedly
@@ -47,6 +48,7 @@ struct OrderSummary {
   std::size_t num_nodes;
   std::size_t num_full_order_nodes;                        ///< number of nodes if every entity had the largest order
 };
+/// Counts the nodes of a space and finds its orders.
 OrderSummary order_summary(const ElementSpace& space);
 
 /// A point at which a cell is inverted.
@@ -96,7 +98,7 @@ struct MeshCheck {
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary
   std::optional<NormalDeviation> normals;  ///< between the boundary and a target of triangles
-  double target_diagonal = 0;                                ///< diagonal of the target's bounding box: 100 per cent
+  double target_diagonal = 0;              ///< diagonal of the target's bounding box: 100 percent
 
   /// Returns true if the mesh can be used as it is: it has no defects except unused vertices, every cell is certified,
   /// the boundary's triangles (those with an area) do not intersect, and no solid lies in another. Returns false if one
@@ -109,9 +111,8 @@ struct MeshCheck {
   double in_percent(double length) const { return target_diagonal > 0 ? 100 * length / target_diagonal : 0; }
 };
 
-/// Throws InputError (naming `what`) if `check_mesh` would reject the extent of these points, that is, if
-/// `require_length` rejects it and it is not zero. Points that are not finite are ignored here: `validate` reports
-/// them.
+/// Throws InputError (naming `what`) if `check_mesh` would reject the extent of these points: if it is neither zero nor
+/// between 1e-40 and 1e40. Points that are not finite are ignored here: `validate` reports them.
 void require_extent(std::span<const Vec3> points, const char* what);
 
 /// Checks everything: defects, topology, quality, certificate, self-intersections, distance.
@@ -119,7 +120,7 @@ void require_extent(std::span<const Vec3> points, const char* what);
 /// target   the surface that the boundary should reproduce, or null.
 /// If the progress callback ends the check, the remaining parts keep their defaults, as if defects ruled them out.
 /// InputError, before anything is checked: options out of range; a mesh or target of more than one point whose extent
-/// `require_length` rejects; a target that `ClosestPoint` rejects; a cloud that is empty or has a point that is not
+/// `require_extent` rejects; a target that `ClosestPoint` rejects; a cloud that is empty or has a point that is not
 /// finite. Anything else that is wrong with the mesh is reported, not thrown.
 /// Deterministic for any number of threads. Cost on one core: about 2 us per hex; per boundary quad, 50 us without a
 /// target and 80 us with one.

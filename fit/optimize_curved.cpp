@@ -14,6 +14,7 @@
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/fit_problem.h"
 #include "subvol/fit/stages/quality_patches.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/untangle.h"
 #include "subvol/mesh/pyramids.h"
@@ -36,9 +37,8 @@ using namespace internal;
 
 namespace {
 
-/// Cells with a lower scaled Jacobian do not indicate their wanted size.
-constexpr double kTrustedJacobian = 0.3;
-constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kFirstSteps = 20;
+/// Largest number of rounds of untangling, and of rounds without a gain; steps of the minimization of the mean.
+constexpr int kMostUntanglingRounds = 40, kUntanglingPatience = 8, kMeanDistortionSteps = 20;
 /// Shares of the work at the ends of its parts, for the progress.
 constexpr double kShareOfCurvedUntangling = 0.5, kShareOfMeanDistortion = 0.7;
 
@@ -47,8 +47,7 @@ CurvedOptimizeOptions checked(const CurvedOptimizeOptions& options) {
     require_in_range("CurvedOptimizeOptions", name, value, low, high);
   };
   in_range("quality", options.quality, 0, kMostQuality);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  check_control("CurvedOptimizeOptions", options.control);
   return options;
 }
 
@@ -123,8 +122,7 @@ CurvedOptimizer::CurvedOptimizer(const HighOrderMesh& mesh, const VolumeMesh& la
       mesh_(box_.to_unit(mesh)),
       labels_(labels),
       projectors_(sheet_projectors(mesh_, labels, options.fixed_boundary)),
-      runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-               options.cancelled, options.log}) {}
+      runner_(options.control) {}
 
 /// Sizes of cells that are inverted or poor say nothing; the sizes around them do.
 void CurvedOptimizer::find_sizes() {
@@ -140,11 +138,10 @@ void CurvedOptimizer::find_sizes() {
 
 std::unique_ptr<HighOrderEnergy> CurvedOptimizer::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
-  constexpr int kLeastPoints = 5;
   std::vector<int> points;
   std::vector<Vec3> boxes;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    points.push_back(std::max(kLeastPoints, points_for_order(space.pattern_order(space.pattern(i)))));
+    points.push_back(std::max(kLeastDistortionPoints, points_for_order(space.pattern_order(space.pattern(i)))));
     boxes.push_back(ideal_boxes_[cells[i]]);
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
@@ -189,11 +186,9 @@ CurvedOptimizer::Part CurvedOptimizer::whole() const {
 
 /// A large mesh moves only around the first of the cells, as many as keep the part small.
 CurvedOptimizer::Part CurvedOptimizer::around(std::span<const Index> cells) const {
-  constexpr int kRings = 2;
-  constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_.space.num_cells()));
   for (std::size_t count = cells.size(); count > 0; count /= 2)
-    if (auto patch = high_order_patch(labels_, mesh_.space, cells.first(count), kRings, most))
+    if (auto patch = high_order_patch(labels_, mesh_.space, cells.first(count), kHighOrderRings, most))
       return make_part(patch->space, patch->cells, patch->nodes, patch->unknowns);
   return whole();
 }
@@ -220,6 +215,7 @@ bool CurvedOptimizer::run_stage(const std::string& name, Part part, int steps) {
 /// Untangles the mesh as a whole, since a few steps untangle most of it, and then what is left with its surroundings
 /// alone: in the mean over all cells, a few hardly count.
 bool CurvedOptimizer::untangle_cells() {
+  // Steps, for the progress, and the number of parts that are untangled with their surroundings alone.
   constexpr int kExpectedSteps = 60, kMostParts = 4;
   runner_.work().begin_part(kShareOfCurvedUntangling, kExpectedSteps);
   const std::vector<Index>& left = quality_.certificate.not_certified;
@@ -263,10 +259,10 @@ Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValu
 
 /// Minimizes the mean distortion and then lifts the poorest cells. Returns false if the work must end.
 bool CurvedOptimizer::improve() {
-  constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;
+  constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;  // of lifts, each from a new state
   find_sizes();
-  runner_.work().begin_part(kShareOfMeanDistortion, kFirstSteps);
-  const bool going = run_stage("mean distortion", whole(), kFirstSteps);
+  runner_.work().begin_part(kShareOfMeanDistortion, kMeanDistortionSteps);
+  const bool going = run_stage("mean distortion", whole(), kMeanDistortionSteps);
   quality_ = measure();
   if (!going || options_.quality == 0) return going;
   runner_.work().begin_part(1, kExpectedLiftSteps);
@@ -288,7 +284,7 @@ void CurvedOptimizer::finish() {
 }
 
 CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
-  constexpr double kLeastGain = 1e-6;
+  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const QualityReport start = measure();
   quality_ = start;
   const bool was_valid = start.certificate.not_certified.empty();

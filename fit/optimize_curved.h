@@ -4,27 +4,23 @@
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/volume_mesh.h"
 
-#include <functional>
 #include <vector>
 
 namespace subvol {
 
+/// Options of `optimize_curved`.
 struct CurvedOptimizeOptions {
   /// True: all nodes of the boundary and of interfaces stay; false: those on flat faces move within their planes, and
   /// those on straight borders along them.
   bool fixed_boundary = false;
   double quality = kUsualQuality;                    ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
-  int max_iterations = 0;                            ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;                     ///< 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
-  internal::StageLog* log =
-      nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  SolveControl control{};
 };
 
+/// The mesh, and how the optimization went.
 struct CurvedOptimizeResult {
   HighOrderMesh mesh;              ///< the given mesh with other coefficients; orders and basis are the same
   std::vector<Index> uncertified;  ///< cells that are not certified, ascending

@@ -13,6 +13,7 @@
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/free_nodes.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -26,8 +27,6 @@ namespace {
 
 /// Correspondences of this length, as a share of the diagonal, count twice (`ClosestPointEnergy::emphasize_far`).
 constexpr double kFarDistance = 0.002;
-/// Cells with a lower scaled Jacobian do not indicate their wanted size.
-constexpr double kTrustedJacobian = 0.3;
 /// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
 
@@ -39,9 +38,8 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   in_range("lambda", options.lambda, 1e-9, 1e9);
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  check_control("OptimizeOptions", options.control);
   in_range("quality", options.quality, 0, kMostQuality);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (has_target && options.fixed_boundary)
     throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");
   return options;
@@ -61,8 +59,7 @@ OptimizeDriver::OptimizeDriver(const VolumeMesh& mesh, const TriangleMesh* targe
       own_boundary_(!target),
       target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
       relief_(mesh.num_cells(), 1),
-      runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-               options.cancelled, options.log}) {
+      runner_(options.control) {
   target_.normalization.take_in(mesh_);
   target_.keep_interfaces(mesh_);
   interfaces_ = find_interfaces(mesh_, topology_);
@@ -97,7 +94,7 @@ void OptimizeDriver::find_features() {
 }
 
 void OptimizeDriver::sample_boundary() {
-  constexpr int kIntervals = 2;
+  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
   samples_ = make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
   refined_.assign(samples_.triangles.size(), 0);
 }
@@ -233,7 +230,7 @@ void OptimizeDriver::relieve_far_cells(std::span<const double> triangle_distance
 }
 
 void OptimizeDriver::weigh_cells(std::span<const double> least_jacobians) {
-  constexpr double kLeast = 1e-3;
+  constexpr double kLeast = 1e-3;  // scaled Jacobian; no cell weighs more than a thousand ideal ones
   weights_.clear();
   for (std::size_t c = 0; c < least_jacobians.size(); ++c)
     weights_.push_back(relief_[c] / std::max(least_jacobians[c], kLeast));

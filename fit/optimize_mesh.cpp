@@ -45,6 +45,8 @@ struct Progress {
   double mean_jacobian = -1, least_jacobian = -1, max_percent = 0;
 
   bool gains_on(const Progress& before, double wanted_percent) const {
+    // Least rise of the mean scaled Jacobian, of the least one, and least relative fall of the distance: one of them
+    // must be reached for another round to be worth its time.
     constexpr double kLeastGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
     return mean_jacobian - before.mean_jacobian >= kLeastGain ||
            least_jacobian - before.least_jacobian >= kLeastOfWorst ||
@@ -160,8 +162,9 @@ bool MeshOptimizer::untangle_all() {
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
+  // Ideal boxes and weights change after kSteps steps: more steps toward those of before are lost.
   constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
-  constexpr double kLeastLambdaShare = 1.0 / 64;
+  constexpr double kLeastShareOfLambda = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
   runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kSteps * kMaxRounds / 2);
@@ -171,7 +174,7 @@ bool MeshOptimizer::improve() {
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
     const bool too_far = mean_percent_ > kMeanShareOfTolerance * options_.mean_tolerance_percent ||
                          (held_ != Held::nothing && changes_volumes());
-    if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
+    if (too_far && lambda > kLeastShareOfLambda * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxShareOfTolerance * options_.max_tolerance_percent)) {
       gains_ended_ = true;
@@ -201,7 +204,7 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 /// Returns true if a result is better than a start whose cells are all certified: closer to a surface that the start
 /// was too far from, or of better cells at distances that are within the tolerances or no larger.
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
-  constexpr double kLeastGain = 1e-6;
+  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
   if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||
@@ -213,11 +216,11 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
   return gain > kLeastGain || (gain > -kLeastGain && now.mean_jacobian > start.mean_jacobian + kLeastGain);
 }
 
-/// Raises the least scaled Jacobian towards a goal; if the surface suffers, it counts more in another attempt. Returns
+/// Raises the least scaled Jacobian toward a goal; if the surface suffers, it counts more in another attempt. Returns
 /// false if the work must end.
 bool MeshOptimizer::raise_quality(double goal) {
-  constexpr double kMoreSurface = 10;
-  constexpr int kAttempts = 2;
+  constexpr double kMoreSurface = 10;  // factor on the weight of the surface in the second attempt
+  constexpr int kAttempts = 2;         // with the weight of the surface as it is, and with kMoreSurface times that
   const Measured before = measure();
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
@@ -240,7 +243,7 @@ bool MeshOptimizer::raise_quality(double goal) {
 /// Raises the least scaled Jacobian to the quality that was asked for and then, from there, beyond it. Returns false if
 /// the work must end.
 bool MeshOptimizer::raise_quality() {
-  constexpr double kBeyond = 0.1;
+  constexpr double kBeyond = 0.1;  // scaled Jacobian that is asked for beyond the aim, once that is reached
   if (options_.quality == 0) return true;
   if (!raise_quality(options_.quality)) return false;
   if (measure_quality(mesh_).min_scaled_jacobian < options_.quality) return true;
@@ -262,7 +265,7 @@ void MeshOptimizer::keep_volumes() {
 
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
 bool MeshOptimizer::steps_ran_out() const {
-  return options_.max_iterations > 0 &&
+  return options_.control.max_iterations > 0 &&
          std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
            return stage.kept && !stage.raises_quality && stage.ended == MinimizerStop::iteration_limit;
          });
@@ -285,7 +288,7 @@ void MeshOptimizer::finish(bool going) {
     report_.explanation = formatted("all cells are valid%s; boundary within %.4g %% of its surface",
                                     gains_ended_ && !cut_short ? " and no longer gain" : "", max_percent_);
     if (cut_short)
-      report_.explanation += formatted("; stages took all of the %d steps allowed", options_.max_iterations);
+      report_.explanation += formatted("; stages took all of the %d steps allowed", options_.control.max_iterations);
   }
 }
 

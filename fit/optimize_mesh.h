@@ -4,17 +4,13 @@
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
-#include <functional>
 #include <vector>
 
 namespace subvol {
-
-namespace internal {
-class StageLog;
-}
 
 /// Wanted sizes of the cells.
 enum class CellSizes {
@@ -22,6 +18,7 @@ enum class CellSizes {
   local     ///< the present sizes: graded meshes stay graded
 };
 
+/// Options of `optimize_mesh`.
 struct OptimizeOptions {
   bool fixed_boundary = false;           ///< true: boundary vertices stay; false: they slide along the surface
   CellSizes sizes = CellSizes::local;
@@ -32,16 +29,12 @@ struct OptimizeOptions {
   /// large. If the largest distance is too large, only the cells beside such places get less weight.
   double lambda = 0.1;
   double quality = kUsualQuality;        ///< least scaled Jacobian to aim at first, in [0, 0.8]; 0: none
-  /// Largest acceptable distances, in per cent of the diagonal, > 0.
+  /// Largest acceptable distances, in percent of the diagonal, > 0.
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
-  int max_iterations = 0;                ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;         ///< 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
-  internal::StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  SolveControl control{};
 };
 
+/// The mesh, and how the optimization went.
 struct OptimizeResult {
   VolumeMesh mesh;                 ///< the given mesh with new positions
   std::vector<Index> uncertified;  ///< cells that are not certified, ascending

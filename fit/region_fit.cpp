@@ -44,7 +44,7 @@ namespace {
 /// A grid is first asked for this share of the cells allowed, so that one that comes out larger still has room; after a
 /// grid that was too large, the next is asked for a little less than would have fitted.
 constexpr double kAskedShare = 0.85, kRetryShare = 0.95;
-constexpr int kGridTries = 3;
+constexpr int kGridTries = 3;  // grids
 
 RegionSurface normalized(RegionSurface surface, const Normalization& normalization) {
   surface.mesh.positions = normalization.to_unit(std::move(surface.mesh.positions));
@@ -80,7 +80,7 @@ class RegionFit : AutomaticDriver {
   /// allowed as the aim, those of 19-wavy were 0.5 % of the diagonal off, with this one 0.02 %, at a least scaled
   /// Jacobian of 0.45 instead of 0.58.
   double aimed_max_percent() const override {
-    constexpr double kMostFromPlanes = 0.1;
+    constexpr double kMostFromPlanes = 0.1;  // percent of the diagonal
     return follows_edges_ ? std::min(kMostFromPlanes, options_.max_tolerance_percent) : options_.max_tolerance_percent;
   }
   bool judge(AutomaticFitTrial trial) override;
@@ -105,7 +105,7 @@ void RegionFit::find_curves() {
 
 /// Says where more than three regions, the outside among them, meet along an edge of the target; empty if nowhere does.
 std::string crowded_curve(const RegionSurface& target) {
-  constexpr std::size_t kMost = 3;
+  constexpr std::size_t kMost = 3;  // regions, the outside among them
   std::string text;
   for_each_edge(sorted_half_edges(target.mesh.triangles, target.mesh.positions.size()),
                 [&](std::span<const SurfaceHalfEdge> edge) {
@@ -206,7 +206,7 @@ void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& to
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
 bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
-  constexpr int kIntervals = 2;
+  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
   const MeshTopology topology(mesh_);
   QualityBoundary boundary;
   boundary.interfaces = find_interfaces(mesh_, topology).faces;
@@ -286,6 +286,7 @@ bool RegionFit::make_pillowed(std::size_t most) {
 
 /// Fits a pillowed grid that is refined once, unless the regions need too many cells for that.
 bool RegionFit::run_smooth(std::size_t cells) {
+  // Share of the cells asked for: a pillowed grid of more would have too many once it is refined.
   constexpr double kMostExcess = 1.4;
   const std::size_t coarse = std::max(kLeastTemplateCells, cells / kChildren);
   if (!make_pillowed(coarse)) return !no_template_.empty();

@@ -10,6 +10,7 @@
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
@@ -34,8 +35,7 @@ void check_options(const FitOptions& options) {
   in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
   in_range("quality", options.quality, 0, kMostQuality);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  check_control("FitOptions", options.control);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
@@ -49,8 +49,7 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
       target_(std::move(target)),
       template_(template_mesh),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
-               options.log}) {
+      runner_(options.control, options.solver) {
   require_valid(template_mesh, "template mesh");
   require_no_pyramids(template_.kinds,
                       "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
@@ -100,10 +99,10 @@ void SubdivisionDriver::sample_target() {
   }
 }
 
-/// Ends a fit to some of the target's samples with a few steps towards all of them, and rolls them back if more of the
+/// Ends a fit to some of the target's samples with a few steps toward all of them, and rolls them back if more of the
 /// boundary's triangles intersect then. Returns false if the fit must end.
 bool SubdivisionDriver::fit_all_samples() {
-  constexpr int kSteps = 2;
+  constexpr int kSteps = 2;  // the state is close to a minimum already
   if (samples_all_) return true;
   const std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return false;
@@ -153,7 +152,9 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
 /// Makes the level's start valid by continuation from the linear split L of the level below:
 ///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionDriver::start_level() {
-  constexpr int kMaxRounds = 60;
+  constexpr int kMaxRounds = 60;  // of a continuation, to bound the time
+  // Factor on the gain of t until it is feasible, the least gain that counts, and the share of the rest below which the
+  // gain is slow: then lambda rises.
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
   const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
@@ -218,7 +219,7 @@ void SubdivisionDriver::note_mean(std::span<const SurfaceDistance> distances) {
   if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
 }
 
-/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
+/// Returns the mean distance between the target and the fit, in percent of the diagonal: the largest one of the finite
 /// element mesh's, of its interfaces', and of the limit surface's. If the quality is to be raised from this state, the
 /// largest distances are needed then, so they are measured at once.
 double SubdivisionDriver::measured_mean() {

@@ -60,7 +60,7 @@ class SubdivisionDriver : protected StagedFit {
   bool end_for_memory(const std::string& why);
   void prepare_level();
   bool start_level();
-  /// Ends a fit to some of the target's samples with a few steps towards all of them.
+  /// Ends a fit to some of the target's samples with a few steps toward all of them.
   bool fit_all_samples();
   /// Runs one minimization on the current level.
   bool run_stage(const Stage& stage, const std::string& name);

@@ -103,7 +103,6 @@ constexpr int kLaterLiftSteps = 20;
 /// Raises the lowest scaled Jacobians of the finest mesh as far as the distances do not suffer, or rolls back. Returns
 /// false if the fit must end.
 bool SubdivisionFit::raise_quality() {
-  constexpr double kMaxMargin = 0.8;      // samples miss the farthest places
   constexpr double kEnoughOfGoal = 0.75;  // a gain to this share of the quality aimed at ends the attempts
   constexpr double kPoorShare = 0.5;      // the surface is drawn back only if the quality was below this share
   const StageRecord* last = result_.report.last_kept_stage();

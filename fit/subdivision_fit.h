@@ -12,6 +12,7 @@
 
 namespace subvol {
 
+/// The cage, the finest mesh, and how the fit went.
 struct FitResult {
   VolumeMesh cage;   ///< the last control mesh with its tags; its limit surface is the fitted surface
   VolumeMesh mesh;   ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)

@@ -25,14 +25,14 @@ AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions 
   if (find_regions(target, options.regions)) counts = {kRegionTemplateCells};
   if (options.cells) counts = {*options.cells};
   std::optional<AutomaticFitResult> best;
-  const double limit = options.time_limit_seconds;
+  const double limit = options.control.time_limit_seconds;
   for (const std::size_t cells : counts) {
     const bool has_no_edges = best && !best->trials.empty() && best->trials[best->chosen].curves == 0;
     if (has_no_edges && cells > kTemplateCells.back()) break;
     options.cells = cells;
     if (limit > 0) {
       const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;
-      options.time_limit_seconds = std::max(kLeastTime, limit - used.count());
+      options.control.time_limit_seconds = std::max(kLeastTime, limit - used.count());
     }
     AutomaticFitResult made = fit_automatically(target, options);
     const StopReason reason = made.report.stop_reason;

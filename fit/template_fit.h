@@ -12,11 +12,12 @@ namespace subvol {
 /// Numbers of cells of a template that are tried if none is given, in this order until the flat cells come as close as
 /// the following distances: the fit that starts from them brings them closer.
 inline constexpr std::array<std::size_t, 3> kTemplateCells{300, 1000, 3000};
-inline constexpr double kTemplateMeanPercent = 0.3, kTemplateMaxPercent = 2;
+inline constexpr double kTemplateMeanPercent = 0.3, kTemplateMaxPercent = 2;  ///< of the diagonal
 
 /// Number that is tried after those for curved cells, which are not subdivided, if the target has sharp edges to
 /// follow.
 inline constexpr std::size_t kCurvedEdgeCells = 10000;
+/// The fit that a template is made for.
 enum class TemplateUse { subdivision, curved_cells };
 
 /// Number of cells of the template if the target has several regions and no number is given.

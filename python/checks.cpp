@@ -117,7 +117,7 @@ not_certified_cells   (m,) int32)");
              R"(distance(surface, target, *, samples=50000, progress=None, threads=None)
 --
 
-Distances between two surfaces, both ways: dict, lengths and per cent of the diagonal of the target's bounding box.
+Distances between two surfaces, both ways: dict, lengths and percent of the diagonal of the target's bounding box.
 
 samples  about so many points carry each mean)");
   module.def("self_intersections", &intersections, py::arg("surface"),

@@ -185,7 +185,7 @@ what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; i
            the quality of the cells; 'cage:FILE' is the cage, 'animation:FILE.glb' the fit as it went where its states
            were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside,
            'boundary:FILE.vtu', .vtk or .xdmf holds the faces of the boundary with their groups
-chord      how close triangles are to a curved surface, per cent of its bounding box's diagonal
+chord      how close triangles are to a curved surface, percent of its bounding box's diagonal
 unit, up   meters a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
 cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stands across, also with a place between 0
            and 1 as 'z:0.3'; None: across the mesh's shortest extent, halfway
@@ -193,7 +193,7 @@ wireframe  scenes show the edges of the cells
 quantize   scenes in 16 and 8 bits (KHR_mesh_quantization)
 limit      a VolumeMesh is a control mesh: scenes show its limit surface
 intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order
-map_tolerance  largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, per cent
+map_tolerance  largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, percent
            of the diagonal; a warning tells if it is larger, or if these cells are not valid
 msh_version  of a .msh: '4.1', or '2.2', which more programs read
 vtu_cells  curved cells of a .vtu: 'lagrange', or 'bezier', whose points are control points)");

@@ -41,8 +41,8 @@ class Filling {
     keywords_.take("levels", options_.levels);
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
-    keywords_.take("max_iterations", options_.max_iterations);
-    keywords_.take("time_limit", options_.time_limit_seconds);
+    keywords_.take("max_iterations", options_.control.max_iterations);
+    keywords_.take("time_limit", options_.control.time_limit_seconds);
     take_chord(keywords_, writing_);
     keywords_.finish();
     target_ = triangles_from(target, "target");
@@ -54,11 +54,10 @@ class Filling {
   }
 
   std::shared_ptr<Filled> run() {
-    options_.progress = work_.progress();
-    options_.cancelled = work_.cancelled();
+    work_.watch(options_.control);
     std::vector<std::string> warnings = std::move(remarks_);
     AutomaticFitResult found = checkpoints_.run(work_, "fit", warnings, [&](internal::StageLog* log) {
-      options_.log = log;
+      options_.control.log = log;
       return fit_automatically(target_, options_);
     });
     if (found.mesh.num_cells() == 0) throw InputError("fill: ended before there was a mesh");
@@ -135,12 +134,12 @@ quality        least scaled Jacobian to aim at, at most 0.8
 crease_angle   degrees: edges of the target sharper than this stay sharp; negative: none; None: 40, if the target is a
                designed part and no scan
 regions        what becomes of closed parts inside others and of sheets inside a solid: 'auto', 'keep' or 'merge'
-wrap           fill a closed surface that follows the target, made of voxels this large, in per cent of the diagonal;
+wrap           fill a closed surface that follows the target, made of voxels this large, in percent of the diagonal;
                None: 0.5 if the target bounds no solid after its repair (parts united, holes covered), else none
 keep_groups    follow borders between groups of the target's faces like sharp edges
 cage           make a subdivision volume: a cage, whose points are the only unknowns, and the mesh it is subdivided to
 levels         times the template of a cage is subdivided to the mesh, 1 .. 6; always once if edges are followed
-tolerance      mean distance to aim at, per cent of the diagonal of the target's bounding box
+tolerance      mean distance to aim at, percent of the diagonal of the target's bounding box
 max_tolerance  the same for the largest distance
 
 max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";

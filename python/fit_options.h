@@ -22,8 +22,8 @@ void take_solver_options(Keywords& keywords, Options& options) {
   keywords.take("correspondence", options.correspondence,
                 {{"closest", Correspondence::closest}, {"voronoi", Correspondence::voronoi}});
   keywords.take("solver", options.solver, {{"newton", SolverKind::newton}, {"lbfgs", SolverKind::lbfgs}});
-  keywords.take("max_iterations", options.max_iterations);
-  keywords.take("time_limit", options.time_limit_seconds);
+  keywords.take("max_iterations", options.control.max_iterations);
+  keywords.take("time_limit", options.control.time_limit_seconds);
 }
 
 /// Takes order, basis, adaptive, tolerance, and the above.

@@ -58,8 +58,8 @@ class Fit {
     read_options(!template_mesh.is_none());
     target_ = target_with_regions_from(target, "target");
     refuse_for_points(template_mesh.is_none());
-    double& time_limit = curved_ ? high_order_.time_limit_seconds : subdivision_.time_limit_seconds;
-    template_options_.time_limit_seconds = kTemplateShareOfTime * time_limit;
+    double& time_limit = curved_ ? high_order_.control.time_limit_seconds : subdivision_.control.time_limit_seconds;
+    template_options_.control.time_limit_seconds = kTemplateShareOfTime * time_limit;
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     untangle_template(time_limit);
     // Making the template may have used part of the time limit.
@@ -114,9 +114,9 @@ class Fit {
     if (!cli::has_few_inverted_cells(*template_)) return;
     auto mesh = std::make_shared<VolumeMesh>(*template_);
     const UntangledStart untangled = work_.run("untangle", [&] {
-      return untangle_before_fit(
-          *mesh,
-          {.time_limit_seconds = time_limit_seconds, .progress = work_.progress(), .cancelled = work_.cancelled()});
+      OptimizeOptions options{.control = {.time_limit_seconds = time_limit_seconds}};
+      work_.watch(options.control);
+      return untangle_before_fit(*mesh, options);
     });
     require_untangled(untangled, "fit");
     if (untangled.tangled > 0)
@@ -133,8 +133,7 @@ class Fit {
   }
 
   std::shared_ptr<const VolumeMesh> made_template() {
-    template_options_.progress = work_.progress();
-    template_options_.cancelled = work_.cancelled();
+    work_.watch(template_options_.control);
     made_ = work_.run("template", [&] {
       return fit_template(std::get<TriangleMesh>(target_), template_options_,
                           curved_ ? TemplateUse::curved_cells : TemplateUse::subdivision);
@@ -144,10 +143,9 @@ class Fit {
   }
 
   void fit_subdivision(Fitted& result) {
-    subdivision_.progress = work_.progress();
-    subdivision_.cancelled = work_.cancelled();
+    work_.watch(subdivision_.control);
     FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](internal::StageLog* log) {
-      subdivision_.log = log;
+      subdivision_.control.log = log;
       return std::visit(
           [&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
     });
@@ -169,10 +167,9 @@ class Fit {
   }
 
   void fit_curved(Fitted& result) {
-    high_order_.progress = work_.progress();
-    high_order_.cancelled = work_.cancelled();
+    work_.watch(high_order_.control);
     HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](internal::StageLog* log) {
-      high_order_.log = log;
+      high_order_.control.log = log;
       return std::visit([&](const auto& target) { return fit_high_order(target, *template_, high_order_); }, target_);
     });
     const MeshCheck found = work_.run("check", [&] {
@@ -248,7 +245,7 @@ adaptive  raise orders only where it pays
 And with both:
 crease_angle    degrees: keep edges of the target sharper than this sharp
 keep_groups     keep borders between groups of the target's faces in the same way
-tolerance       mean distance to reach, per cent of the diagonal of the target's bounding box
+tolerance       mean distance to reach, percent of the diagonal of the target's bounding box
 quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_close    weight of the cells' shape in the last stage; None: 0.005; with order 0.05, or 0.0025 if creases follow
                 nearly all of the target's sharp edges
@@ -262,7 +259,7 @@ time_limit      seconds; 0: none
 checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimizations end, and
                 however the call ends
 resume          checkpoint of an earlier call with the same target, template and options: goes on where that ended
-chord           how close triangles are to the surface that is measured, per cent of its diagonal
+chord           how close triangles are to the surface that is measured, percent of its diagonal
 progress        called with a Progress at every step; returns False to end with the best result so far
 threads         for this call alone; None: as many as OpenMP gives
 
@@ -301,7 +298,7 @@ void take_chord(Keywords& keywords, cli::WritingOptions& writing) {
 void require_chord(double percent) {
   constexpr double kLeast = 1e-4, kMost = 100;  // as in the program
   if (!(percent >= kLeast && percent <= kMost))
-    throw InputError(internal::formatted("chord must be in [%g, %g] per cent, got %g", kLeast, kMost, percent));
+    throw InputError(internal::formatted("chord must be in [%g, %g] percent, got %g", kLeast, kMost, percent));
 }
 
 void add_fits(py::module_& module) {

@@ -120,7 +120,7 @@ Straight cells to begin with.)");
       },
       py::arg("chord") = cli::WritingOptions{}.chord_percent,
       "boundary($self, chord=0.005)\n--\n\n"
-      "The curved boundary as triangles within chord per cent of its diagonal: SurfaceMesh.");
+      "The curved boundary as triangles within chord percent of its diagonal: SurfaceMesh.");
   type.def("copy", [](const CurvedMesh& curved) { return std::make_shared<CurvedMesh>(curved); },
            "copy($self)\n--\n\nA mesh of its own with the same content.");
   type.def("__repr__", [](const CurvedMesh& curved) {

@@ -156,7 +156,7 @@ The square SparseMap that moves boundary points to the Catmull-Clark limit surfa
              R"(limit_surface(cage, *, chord=0.005)
 --
 
-The limit surface of a control mesh as quads within chord per cent of its diagonal: SurfaceMesh.
+The limit surface of a control mesh as quads within chord percent of its diagonal: SurfaceMesh.
 
 Points along creases of infinite sharpness are there once for each side.)");
 }

@@ -88,8 +88,8 @@ class Optimization {
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
     keywords_.take("quality", options_.quality);
     keywords_.take("lambda_", options_.lambda);
-    keywords_.take("max_iterations", options_.max_iterations);
-    keywords_.take("time_limit", options_.time_limit_seconds);
+    keywords_.take("max_iterations", options_.control.max_iterations);
+    keywords_.take("time_limit", options_.control.time_limit_seconds);
     keywords_.refuse({"chord"}, "goes with order only");
   }
 
@@ -108,17 +108,16 @@ class Optimization {
     curving_.follows_all_edges = keywords_.has("crease_angle");
     curving_.crease_angle_degrees = options_.crease_angle_degrees;
     keywords_.take("crease_angle", curving_.crease_angle_degrees);
-    keywords_.take("max_iterations", curving_.max_iterations);
-    keywords_.take("time_limit", curving_.time_limit_seconds);
+    keywords_.take("max_iterations", curving_.control.max_iterations);
+    keywords_.take("time_limit", curving_.control.time_limit_seconds);
     take_chord(keywords_, writing_);
   }
 
   void optimize(Optimized& result) {
-    options_.progress = work_.progress();
-    options_.cancelled = work_.cancelled();
+    work_.watch(options_.control);
     const TriangleMesh* target = target_ ? &*target_ : nullptr;
     OptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
-      options_.log = log;
+      options_.control.log = log;
       return optimize_mesh(*mesh_, target, options_);
     });
     const MeshCheck checked = work_.run("check", [&] {
@@ -132,14 +131,11 @@ class Optimization {
   }
 
   void optimize_curved_cells(Optimized& result) {
-    CurvedOptimizeOptions options{.fixed_boundary = options_.fixed_boundary,
-                                  .quality = options_.quality,
-                                  .max_iterations = options_.max_iterations,
-                                  .time_limit_seconds = options_.time_limit_seconds,
-                                  .progress = work_.progress(),
-                                  .cancelled = work_.cancelled()};
+    CurvedOptimizeOptions options{
+        .fixed_boundary = options_.fixed_boundary, .quality = options_.quality, .control = options_.control};
+    work_.watch(options.control);
     CurvedOptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
-      options.log = log;
+      options.control.log = log;
       return optimize_curved(start_->mesh, *mesh_, options);
     });
     const MeshCheck checked = work_.run("check", [&] {
@@ -156,16 +152,14 @@ class Optimization {
   }
 
   void curve(Optimized& result) {
-    curving_.progress = work_.progress();
-    curving_.cancelled = work_.cancelled();
+    work_.watch(curving_.control);
     VolumeMesh start = *mesh_;
     std::optional<HighOrderMesh> curved_start;
     if (start_) curved_start = start_->mesh;
     const auto with_limits = [&](auto options, StageLog* log) {
-      options.time_limit_seconds = curving_.time_limit_seconds;
-      options.progress = curving_.progress;
-      options.cancelled = curving_.cancelled;
-      options.log = log;
+      options.control = curving_.control;
+      options.control.max_iterations = 0;  // the caller's limit is that of the fit
+      options.control.log = log;
       return options;
     };
     const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
@@ -173,12 +167,12 @@ class Optimization {
                           : untangle_before_fit(start, with_limits(OptimizeOptions(), log));
     });
     require_untangled(untangled, "optimize");
-    curving_.time_limit_seconds = work_.time_left(curving_.time_limit_seconds);
+    curving_.control.time_limit_seconds = work_.time_left(curving_.control.time_limit_seconds);
     if (untangled.tangled > 0)
       warnings_.push_back(std::to_string(untangled.tangled) +
                           " cells were not valid; they were untangled before curving");
     HighOrderFitResult found = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
-      curving_.log = log;
+      curving_.control.log = log;
       return curved_start ? fit_high_order(*target_, *curved_start, start, curving_)
                           : fit_high_order(*target_, start, curving_);
     });
@@ -232,7 +226,7 @@ target          what the boundary is to reproduce: SurfaceMesh, VolumeMesh or pa
 fixed_boundary  boundary points stay; otherwise they slide along the surface; those of curved cells in flat parts only
 sizes           ideal sizes of the cells: 'uniform', or as they are, 'local'
 crease_angle    degrees: edges of the surface sharper than this stay sharp
-tolerance       mean distance from the surface to keep within, per cent of its diagonal
+tolerance       mean distance from the surface to keep within, percent of its diagonal
 max_tolerance   the same for the largest distance
 quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_         weight of the cells' shape; None: 0.1, with order 0.0025

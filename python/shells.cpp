@@ -41,8 +41,7 @@ class Growing {
 
   std::shared_ptr<Shelled> run() {
     auto result = std::make_shared<Shelled>();
-    options_.progress = work_.progress();
-    options_.cancelled = work_.cancelled();
+    work_.watch(options_.control);
     preparation_.cancelled = work_.cancelled();
     surface_ = work_.run("repair", [&] { return cli::prepared_surface(given_, preparation_); });
     if (crease_angle_) options_.tags = surface_features(surface_.polygons, *crease_angle_);
@@ -76,8 +75,8 @@ class Growing {
     keywords_.take("order", curved_options_.order);
     if (!keywords_.has("order")) keywords_.refuse({"basis"}, "goes with order only");
     keywords_.take("basis", curved_options_.basis, bases());
-    keywords_.take("max_iterations", options_.max_iterations);
-    keywords_.take("time_limit", options_.time_limit_seconds);
+    keywords_.take("max_iterations", options_.control.max_iterations);
+    keywords_.take("time_limit", options_.control.time_limit_seconds);
     take_chord(keywords_, writing_);
     keywords_.finish();
     require_in_range("shell", "order", curved_options_.order, 1,
@@ -86,7 +85,7 @@ class Growing {
     require_in_range("shell", "growth", options_.growth, 0.01, 100);
     if (straight && curved_options_.order > 1) throw InputError("shell: straight and order exclude each other");
     options_.optimize = !straight;
-    curved_options_.max_iterations = options_.max_iterations;
+    curved_options_.control.max_iterations = options_.control.max_iterations;
   }
 
   void read_thickness(const py::object& thickness) {
@@ -141,12 +140,11 @@ class Growing {
       shell.report.warnings.push_back("the cells were left straight, for the shell is not valid");
       return;
     }
-    curved_options_.time_limit_seconds = work_.time_left(options_.time_limit_seconds);
+    curved_options_.control.time_limit_seconds = work_.time_left(options_.control.time_limit_seconds);
     curved_options_.boundary = [this](const HighOrderMesh& mesh) {
       return curved_boundary(mesh, writing_.chord_percent);
     };
-    curved_options_.progress = work_.progress();
-    curved_options_.cancelled = work_.cancelled();
+    work_.watch(curved_options_.control);
     result.curved_shell = work_.run("curve", [&] { return curve_shell(shell, curved_options_); });
     cli::take_figures(*result.curved_shell, shell);
     result.curved = std::make_shared<CurvedMesh>(

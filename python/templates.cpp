@@ -246,7 +246,7 @@ pillow  put a layer of cells around the whole boundary, counted in)");
 
 Fills a box with equal hexes.
 
-surface  the box around it, moved outward by margin per cent of its diagonal; or
+surface  the box around it, moved outward by margin percent of its diagonal; or
 box      x0 y0 z0 x1 y1 z1
 counts   cells along each axis; or
 size     about how long a cell is)");
@@ -285,7 +285,7 @@ vertices  the two points)");
             R"(merge(mesh, other=None, *, tolerance=1e-06)
 --
 
-Glues faces that lie on each other, of one mesh or two; tolerance in per cent of the box's diagonal.)");
+Glues faces that lie on each other, of one mesh or two; tolerance in percent of the box's diagonal.)");
   group.def("split", &make_split, py::arg("mesh"),
             R"(split(mesh, *, into='parts', edge=None, parts=2)
 --

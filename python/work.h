@@ -3,7 +3,7 @@
 
 #include "python/keywords.h"
 #include "subvol/base/work_progress.h"
-#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 
 #include <pybind11/pybind11.h>
 
@@ -56,6 +56,11 @@ class Work {
   /// Callback for the library's options. It is called by the thread that called the library.
   std::function<bool(const FitProgress&)> progress() {
     return [this](const FitProgress& told) { return tell(told); };
+  }
+  /// Sets the callbacks of a solve.
+  void watch(SolveControl& control) {
+    control.progress = progress();
+    control.cancelled = cancelled();
   }
   /// Checks for Ctrl-C between progress reports, within long steps; asks Python at most ten times a second. To be
   /// called only from the calling thread.

@@ -268,7 +268,7 @@ def arguments_of(parser):
     parser.add_argument("--sheet", metavar="NAME", default="outer", help="group of the triangles (default: outer)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--margin", metavar="PERCENT", type=float, default=200,
-                       help="distance from the sheet to the box, in per cent of the sheet's diagonal (default: 200)")
+                       help="distance from the sheet to the box, in percent of the sheet's diagonal (default: 200)")
     where.add_argument("--box", metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"), nargs=6, type=float,
                        help="corners of the box")
     parser.add_argument("--size", metavar="LENGTH", type=float,

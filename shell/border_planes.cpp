@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/border_planes.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Eigenvalues>
@@ -87,7 +88,7 @@ std::vector<Run> FlatBorders::loops() const {
 
 /// Cuts a loop at its sharp turns.
 std::vector<Run> FlatBorders::pieces_of(const Run& loop) const {
-  constexpr double kTurnDegrees = 30;
+  constexpr double kTurnDegrees = 30;  // between two edges of a border
   const double least = std::cos(kTurnDegrees * std::numbers::pi / 180);
   const std::size_t n = loop.size();
   std::vector<std::size_t> turns;
@@ -107,8 +108,7 @@ std::optional<BorderPlane> FlatBorders::plane_of_run(const Run& run) const {
   constexpr double kMostAlike = 0.95;  // cosine of the angle between the normals of the plane and of a face
   BorderPlane plane{Vec3::Zero(), {}};
   for (const Index h : run) plane.vertices.insert(plane.vertices.end(), {from(h), to(h)});
-  std::sort(plane.vertices.begin(), plane.vertices.end());
-  plane.vertices.erase(std::unique(plane.vertices.begin(), plane.vertices.end()), plane.vertices.end());
+  sort_unique(plane.vertices);
   const std::optional<Vec3> normal = plane_of(plane.vertices, positions_, tolerance_);
   if (!normal) return std::nullopt;
   for (const Index h : run)

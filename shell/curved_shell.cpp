@@ -2,6 +2,7 @@
 #include "subvol/shell/curved_shell.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/geometry/self_intersection.h"
@@ -22,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kLeastIntervals = 4;
+constexpr int kLeastIntervals = 4;  // of samples along an edge
 /// Share of the work that is done when the straight shell is there.
 constexpr double kStraightShare = 0.97;
 
@@ -52,8 +53,7 @@ NodeStrands node_strands(const ShellLayers& layers, const ElementSpace& space) {
     strands.clear();
     for (const Index v : vertices)
       if (const Index strand = layers.strand(v); strand != kNoIndex) strands.push_back(strand);
-    std::sort(strands.begin(), strands.end());
-    strands.erase(std::unique(strands.begin(), strands.end()), strands.end());
+    sort_unique(strands);
     for (std::size_t i = 0; i < count; ++i) {
       nodes.strands.insert(nodes.strands.end(), strands.begin(), strands.end());
       nodes.offsets.push_back(nodes.strands.size());
@@ -89,8 +89,7 @@ class CurvedShellCheck {
     };
     for (const auto& [t, s] : found.pairs) add(t, s);
     for (const Index t : found.degenerate) add(t, t);
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    sort_unique(pairs);
     return pairs;
   }
 
@@ -104,8 +103,7 @@ class CurvedShellCheck {
     const MeshTopology& topology = space_.topology();
     for (const auto& pair : intersecting_faces(nodes, ended))
       for (const Index place : pair) add(topology.face(topology.boundary_faces()[place]));
-    std::sort(strands.begin(), strands.end());
-    strands.erase(std::unique(strands.begin(), strands.end()), strands.end());
+    sort_unique(strands);
     return strands;
   }
 
@@ -119,7 +117,6 @@ class CurvedShellCheck {
 /// columns that stay in a plane move in it.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
-  constexpr int kLeastPoints = 5;
   SparseMap nodes;
   std::vector<Vec3> fixed(mesh.coefficients.size(), Vec3::Zero());
   for (std::size_t i = 0; i < fixed.size(); ++i) {
@@ -145,7 +142,7 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
     }
   }
   const std::vector<int> points(mesh.space.num_cells(),
-                                std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
+                                std::max(kLeastDistortionPoints, points_for_order(mesh.space.max_order())));
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
   energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others
@@ -161,8 +158,7 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
            FitReport& report) {
   std::vector<Vec3> unknowns;
   FitProblem problem = make_problem(shell, mesh, strands, unknowns);
-  const StageRunner runner({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-                            options.cancelled});
+  const StageRunner runner(options.control);
   StageRecord record;
   record.name = "order " + std::to_string(options.order);
   record.order = options.order;
@@ -181,7 +177,7 @@ CurvedShellOptions checked(const ShellResult& shell, const CurvedShellOptions& o
   if (options.order < 1 || options.order > kMaxOrder)
     throw InputError("shell: the order must be in 1 .. " + std::to_string(kMaxOrder) + ", got " +
                      std::to_string(options.order));
-  if (options.max_iterations < 0 || !(options.time_limit_seconds >= 0))
+  if (options.control.max_iterations < 0 || !(options.control.time_limit_seconds >= 0))
     throw InputError("shell: limits of a solve must not be negative");
   if (!shell.failures.none()) throw InputError("shell: only a valid shell can be curved");
   return options;
@@ -224,10 +220,10 @@ CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unch
   const std::vector<Vec3> straight = curved.mesh.coefficients;
   const auto begin = Clock::now();
   const auto is_late = [&] {
-    return options.time_limit_seconds > 0 &&
-           std::chrono::duration<double>(Clock::now() - begin).count() > options.time_limit_seconds;
+    return options.control.time_limit_seconds > 0 &&
+           std::chrono::duration<double>(Clock::now() - begin).count() > options.control.time_limit_seconds;
   };
-  const auto ended = [&] { return (options.cancelled && options.cancelled()) || is_late(); };
+  const auto ended = [&] { return (options.control.cancelled && options.control.cancelled()) || is_late(); };
   solve(shell, options, strands, curved.mesh, curved.report);
 
   const CurvedShellCheck check(shell.layers, space, options);

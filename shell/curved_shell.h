@@ -5,6 +5,7 @@
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/geometry/curved_boundary.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/shell/shell.h"
 #include "subvol/shell/thickness.h"
 
@@ -14,14 +15,11 @@
 
 namespace subvol {
 
+/// Options of `curve_shell`.
 struct CurvedShellOptions {
   int order = 2;                  ///< order of every edge, face and cell, 1 .. kMaxOrder
   Basis basis = Basis::legendre;  ///< Legendre prisms can be certified at any order, Fourier prisms up to order 3 or so
-  int max_iterations = 0;         ///< 0: the default number
-  double time_limit_seconds = 0;  ///< 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
+  SolveControl control{};
   /// Makes the triangles that represent the boundary in the search for intersections, as finely as the caller requires
   /// (`curved_boundary` in export). If empty, each edge gets `max(4, 2 order)` intervals, which miss sharp folds.
   std::function<CurvedBoundary(const HighOrderMesh&)> boundary;
@@ -54,7 +52,7 @@ struct CurvedShell {
 /// Same bits for any number of threads.
 CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& options);
 
-/// Returns the volume mesh's faces on one sheet, in the order of the surface's faces.
+/// Returns the volume mesh's faces on one sheet, in the order of the surface's faces. sheet: 0 .. num_sheets() - 1.
 std::vector<Index> sheet_faces(const ShellLayers& layers, const MeshTopology& topology, int sheet);
 
 /// Samples one sheet of the curved cells: triangles oriented like the surface's faces, and its edges as polylines.

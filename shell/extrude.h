@@ -9,6 +9,7 @@
 
 namespace subvol {
 
+/// Options of `extrude`.
 struct ExtrudeOptions {
   double thickness = 0;            ///< length of the columns, in the surface's unit, > 0
   int layers = 1;                  ///< >= 1

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/mesh/features.h"
 #include "subvol/surface/boundary.h"
@@ -122,8 +123,7 @@ PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags
         is_flat = is_flat && std::abs(normal.dot(surface.positions[v] - origin)) <= tolerance;
         if (number[v] != kNoIndex) plane.vertices.push_back(number[v]);
       }
-    std::sort(plane.vertices.begin(), plane.vertices.end());
-    plane.vertices.erase(std::unique(plane.vertices.begin(), plane.vertices.end()), plane.vertices.end());
+    sort_unique(plane.vertices);
     if (is_flat && !plane.vertices.empty()) result.border_planes.push_back(std::move(plane));
   }
   return result;

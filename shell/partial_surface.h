@@ -16,10 +16,11 @@ inline constexpr double kPatchDegrees = 30;
 /// Returns the faces that are connected with one of a surface's faces through edges that are no sharper than an angle.
 ///
 /// face     a number of the surface, else InputError.
+/// degrees  the angle, in [0, 180].
 /// returns  1 for each face of the patch, else 0.
 std::vector<char> patch_of_face(const PolygonMesh& surface, Index face, double degrees = kPatchDegrees);
 
-/// Returns the face that is closest to a point. InputError: no faces.
+/// Returns the face that is closest to a point. InputError: no faces, a position that is not finite.
 Index closest_face(const PolygonMesh& surface, const Vec3& point);
 
 /// A surface without some of its faces.

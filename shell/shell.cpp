@@ -27,13 +27,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxRounds = 12;
+constexpr int kMaxRounds = 12;  // solves: strands that fail in all of them end at 0.02 of their thickness
 
 void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   if (options.layers < 1) throw InputError("shell: layers must be at least 1, got " + std::to_string(options.layers));
   if (!positive(options.growth)) throw InputError("shell: growth must be positive");
-  if (options.max_iterations < 0 || !(options.time_limit_seconds >= 0))
+  if (options.control.max_iterations < 0 || !(options.control.time_limit_seconds >= 0))
     throw InputError("shell: limits of a solve must not be negative");
   if (options.vertex_thickness.empty()) {
     if (!positive(options.thickness)) throw InputError("shell: thickness must be positive");
@@ -88,8 +88,8 @@ class ShellMaker {
   bool goes_on(bool wanted);
   /// Returns true if the caller or the time limit wants the run to end.
   bool is_to_end() const {
-    return ended_ || (options_.cancelled && options_.cancelled()) ||
-           (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds);
+    return ended_ || (options_.control.cancelled && options_.control.cancelled()) ||
+           (options_.control.time_limit_seconds > 0 && seconds() > options_.control.time_limit_seconds);
   }
   /// Does a part of the work before there is a shell; not if the caller's `cancelled` ends the run.
   void begin_with(const char* part, double fraction, void (ShellMaker::*work)());
@@ -126,16 +126,16 @@ class ShellMaker {
 
 bool ShellMaker::tell(const char* stage, int iteration, double energy, double fraction) {
   if (ended_) return false;
-  return goes_on(!options_.progress || options_.progress({stage, 0, iteration, energy, fraction}));
+  return goes_on(!options_.control.progress || options_.control.progress({stage, 0, iteration, energy, fraction}));
 }
 
 bool ShellMaker::goes_on(bool wanted) {
   if (ended_) return false;
-  if (!wanted || (options_.cancelled && options_.cancelled())) {
+  if (!wanted || (options_.control.cancelled && options_.control.cancelled())) {
     ended_ = true;
     report_.stop_reason = StopReason::cancelled;
     report_.explanation = "stopped by the caller";
-  } else if (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds) {
+  } else if (options_.control.time_limit_seconds > 0 && seconds() > options_.control.time_limit_seconds) {
     ended_ = true;
     report_.stop_reason = StopReason::time_limit;
     report_.explanation = "the time limit is reached";
@@ -151,11 +151,11 @@ void ShellMaker::timed(const char* part, void (ShellMaker::*work)()) {
 
 void ShellMaker::begin_with(const char* part, double fraction, void (ShellMaker::*work)()) {
   tell(part, 0, 0, fraction);
-  if (!options_.cancelled || !options_.cancelled()) timed(part, work);
+  if (!options_.control.cancelled || !options_.control.cancelled()) timed(part, work);
 }
 
 void ShellMaker::require_no_faults() const {
-  const SurfaceFaults faults = find_faults(given_, MendingGoal::layers, options_.cancelled);
+  const SurfaceFaults faults = find_faults(given_, MendingGoal::layers, options_.control.cancelled);
   const std::string text = to_text(faults, given_, {options_.vertex_numbers, options_.face_numbers});
   if (!text.empty()) throw InputError(text);
 }
@@ -192,7 +192,7 @@ void ShellMaker::find_thickness() {
 }
 
 void ShellMaker::start() {
-  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_, options_.cancelled,
+  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_, options_.control.cancelled,
                                                 [this](std::span<const Index> v) { return text_of(v); });
   if (thin.empty()) {
     goes_on(true);
@@ -253,7 +253,7 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
   std::unique_ptr<SurfaceTerm> surface;
   double lambda = 1;
   if (options_.free_surface) {
-    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;
+    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;  // relative to 1 along the normal
     for (std::size_t v = 0; v < layers_.num_columns(); ++v) {
       sampled.push_back(layers_.vertex(layers_.inside, static_cast<Index>(v)));
       fixed_samples.push_back(fixed[sampled.back()]);
@@ -284,7 +284,8 @@ MinimizerStop ShellMaker::solve(int round) {
   const double before = seconds();
   int iteration = 0;
   MinimizerOptions minimizer;
-  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultShellIterations;
+  minimizer.max_iterations =
+      options_.control.max_iterations > 0 ? options_.control.max_iterations : kDefaultShellIterations;
   minimizer.ended = [this] { return is_to_end(); };
   minimizer.progress = [&](const IterationRecord& record) {
     ++iteration;
@@ -305,7 +306,7 @@ MinimizerStop ShellMaker::solve(int round) {
 }
 
 void ShellMaker::optimize() {
-  constexpr double kShrink = 0.7;
+  constexpr double kShrink = 0.7;  // of the thickness of strands that still meet another sheet
   bool apart = false;
   for (int round = 0; round < kMaxRounds && !apart && !ended_; ++round) {
     const MinimizerStop stop = solve(round);

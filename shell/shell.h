@@ -4,11 +4,11 @@
 #include "subvol/fit/quality/corner_quality.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/shell/border_planes.h"
 #include "subvol/shell/shell_check.h"
 #include "subvol/shell/shell_layers.h"
 
-#include <functional>
 #include <vector>
 
 namespace subvol {
@@ -16,8 +16,10 @@ namespace subvol {
 /// Largest number of steps of a solve, if the options state none.
 inline constexpr int kDefaultShellIterations = 60;
 
+/// Side of the surface on which layers grow.
 enum class ShellSide { outward, inward, both };
 
+/// Options of `make_shell`. Its solves take up to kDefaultShellIterations steps if `control` states no limit.
 struct ShellOptions {
   double thickness = 0;                  ///< of each side, in the surface's unit, > 0; see also `vertex_thickness`
   std::vector<double> vertex_thickness;  ///< thickness at each vertex, > 0; empty: `thickness` everywhere
@@ -33,11 +35,7 @@ struct ShellOptions {
   std::vector<BorderPlane> border_planes;
   /// Numbers of the surface's vertices and faces for messages; empty: their own.
   std::vector<Index> vertex_numbers, face_numbers;
-  int max_iterations = 0;                ///< per solve; 0: the default number
-  double time_limit_seconds = 0;         ///< 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
+  SolveControl control{};
 };
 
 /// A shell and its properties. Thicknesses are per strand (`shell_layers.h`), in the surface's unit; a side without

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/shell_check.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 
@@ -19,14 +20,9 @@ std::vector<int> sheets_to_check(const ShellLayers& layers, CheckedSheets which)
   return sheets;
 }
 
-void sort_unique(std::vector<Index>& list) {
-  std::sort(list.begin(), list.end());
-  list.erase(std::unique(list.begin(), list.end()), list.end());
-}
-
 /// Lowers the shares around strands that were held back, so that neighbors differ by at most a quarter.
 void grade(const ShellLayers& layers, std::vector<double>& shares) {
-  constexpr double kStep = 0.25;
+  constexpr double kStep = 0.25;  // of the whole way
   const SurfaceTopology& topology = layers.topology;
   const std::size_t num_columns = layers.num_columns();
   for (int sweep = 0; sweep < static_cast<int>(1 / kStep); ++sweep)
@@ -59,8 +55,7 @@ ShellFailures ShellCheck::failures(std::span<const Vec3> positions, const std::f
   for (const auto& [t, s] : found.pairs) result.intersecting.push_back({polygon[t], polygon[s]});
   for (const Index t : found.degenerate) result.intersecting.push_back({polygon[t], polygon[t]});
   auto& pairs = result.intersecting;
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   return result;
 }
 
@@ -99,7 +94,7 @@ NodeStrands vertex_strands(const ShellLayers& layers) {
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted, const std::function<bool()>& ended,
                           std::vector<double>* shares_out) {
-  constexpr double kShrink = 0.7, kLeast = 0.05;
+  constexpr double kShrink = 0.7, kLeast = 0.05;  // of a share; below kLeast it is 0, so that few shrinkings decide
   std::vector<double> shares(layers.num_strands(), 1.0);
   std::vector<Vec3> state(wanted.begin(), wanted.end());
   for (;;) {

@@ -63,6 +63,7 @@ struct NodeStrands {
     return {strands.data() + offsets[i], offsets[i + 1] - offsets[i]};
   }
 };
+/// Returns the strands of the vertices, which are the nodes of linear cells.
 NodeStrands vertex_strands(const ShellLayers& layers);
 
 /// Returns the strands that make a shell with these nodes invalid, ascending; empty if it is valid.
@@ -78,7 +79,7 @@ using FailingStrands = std::function<std::vector<Index>(std::span<const Vec3> no
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted,
                           const std::function<bool()>& ended = {}, std::vector<double>* shares = nullptr);
-/// `advance` for linear cells.
+/// Does the same for linear cells.
 std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
                           std::span<const Vec3> wanted, const std::function<bool()>& ended = {},
                           std::vector<double>* shares = nullptr);

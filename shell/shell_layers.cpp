@@ -89,6 +89,7 @@ std::vector<double> layer_shares(int num_layers, double growth) {
 }
 
 double growth_of_layers(double thickness, double first_height, int num_layers) {
+  // Ratios of successive layers that are looked for; others are of no use.
   constexpr double kLeastGrowth = 0.01, kMostGrowth = 100;
   const auto text = [](double x) { return formatted("%.6g", x); };
   if (!(thickness > 0) || !(first_height > 0) || !std::isfinite(thickness) || num_layers < 1)
@@ -119,7 +120,7 @@ double growth_of_layers(double thickness, double first_height, int num_layers) {
 }
 
 int number_of_layers(double thickness, double first_height, double growth) {
-  constexpr int kMostLayers = 1000;
+  constexpr int kMostLayers = 1000;  // more are a mistake in the arguments
   if (!(thickness > 0) || !(first_height > 0) || !(growth > 0) || !std::isfinite(thickness))
     throw InputError("shell: thickness, first height and growth must be positive");
   if (first_height > thickness)
@@ -138,7 +139,7 @@ int number_of_layers(double thickness, double first_height, double growth) {
 
 void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,
                             double growth) {
-  constexpr double kLeastShare = 1e-13;
+  constexpr double kLeastShare = 1e-13;  // of the largest coordinate: some hundred units of its last digit
   double largest = 0;
   for (const Vec3& p : surface.positions) largest = std::max(largest, p.lpNorm<Eigen::Infinity>());
   const double least = kLeastShare * largest;

@@ -54,7 +54,7 @@ struct Neighbors {
 
 /// Works like Dijkstra's algorithm: a vertex that was lowered limits its neighbors, the thinnest first.
 void limit_slope(const Neighbors& neighbors, std::span<double> thickness) {
-  constexpr double kSlope = 0.5;
+  constexpr double kSlope = 0.5;  // of the thickness along the surface: an angle of 27 degrees
   using Entry = std::pair<double, Index>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   const auto spread = [&](double t, Index v) {
@@ -85,6 +85,8 @@ void limit_slope(const ShellLayers& layers, std::span<double> thickness) {
 
 std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const Vec3> directions,
                                       std::span<const double> asked) {
+  // Share of the gap, so that two strands leave a tenth of it, and the least share of the thickness asked for, which
+  // keeps it positive.
   constexpr double kShare = 0.45, kLeast = 1e-4;
   std::vector<double> thickness(asked.begin(), asked.end());
   const TriangleMesh surface = triangulate(layers.surface);
@@ -128,7 +130,7 @@ MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const V
 }
 
 void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions) {
-  constexpr double kLeastVisibility = 0.1;
+  constexpr double kLeastVisibility = 0.1;  // cosine between a turned direction and the normals around it: 84 degrees
   const PolygonMesh& surface = layers.surface;
   std::vector<double> visibility(layers.num_columns(), 1);
   std::vector<Vec3> turned(directions.begin(), directions.end());
@@ -162,8 +164,8 @@ double distance_from_planes(const ShellLayers& layers, std::span<const Vec3> pos
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
                                  std::span<const double> thickness, const std::function<bool()>& cancelled,
                                  const std::function<std::string(std::span<const Index>)>& names) {
-  constexpr double kShareOfEdge = 0.02;
-  constexpr int kMaxHalvings = 30;
+  constexpr double kShareOfEdge = 0.02;  // of the shortest edge at a vertex: the first thickness that is tried
+  constexpr int kMaxHalvings = 30;       // 1e-9 of the first thickness is none
   const std::size_t n = layers.num_columns();
   std::vector<double> thin(thickness.begin(), thickness.end());
   for_each_edge(layers, [&](Index a, Index b, double length) {

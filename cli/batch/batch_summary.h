@@ -78,7 +78,7 @@ struct Comparison {
   std::size_t num_common = 0, num_only_before = 0, num_only_now = 0;
 
   static constexpr double kLowerQuality = 0.01;
-  static constexpr double kFartherShare = 0.1, kFartherPercent = 0.001;  ///< per cent of the diagonal
+  static constexpr double kFartherShare = 0.1, kFartherPercent = 0.001;  ///< percent of the diagonal
   static constexpr double kSlowerShare = 0.25, kSlowerSeconds = 1;       ///< times scatter by less on a quiet machine
 };
 Comparison compare(const BatchSummary& before, const BatchSummary& now);

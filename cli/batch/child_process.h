@@ -62,8 +62,8 @@ void watch_children();
 /// Sleeps until a process ends, a signal is caught, or the time is over.
 void wait_for_child(std::chrono::milliseconds most);
 
-/// Returns the file that a program's name stands for: the name itself if it contains a '/', or else the first executable
-/// file of this name in the folders of PATH. UsageError: there is none.
+/// Returns the file that a program's name stands for: the name itself if it contains a '/', or else the first
+/// executable file of this name in the folders of PATH. UsageError: there is none.
 std::filesystem::path find_program(const std::string& name);
 
 /// Path of the program that this process runs.

@@ -12,8 +12,9 @@ namespace subvol::cli {
 
 /// Fingerprints of the files that a model reads.
 struct ModelFiles {
-  std::string hash;   ///< of their contents
-  std::string stamp;  ///< of their sizes and times of change; empty: a file changed so lately that its time may not tell
+  std::string hash;  ///< of their contents
+  /// Of their sizes and times of change; empty: a file changed so lately that its time may not tell a later change.
+  std::string stamp;
 };
 
 /// Finds the files that models read: the input, and every value of an option that names a file.

@@ -21,8 +21,8 @@ struct GroupsFound {
   std::vector<std::string> warnings;
 };
 
-/// These functions give each boundary face of a result the group of the target that it lies on (`carried_groups`). Groups that the mesh
-/// has already stay where the target gives none. Points have no groups.
+/// These functions give each boundary face of a result the group of the target that it lies on (`carried_groups`).
+/// Groups that the mesh has already stay where the target gives none. Points have no groups.
 GroupsFound carry_groups(const Target& target, VolumeMesh& mesh);
 GroupsFound carry_groups(const Target& target, HighOrderFile& file);
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "subvol/base/work_progress.h"
-#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 
 #include <chrono>
 #include <string>

@@ -3,6 +3,7 @@
 
 #include "cli/runs/scene_chord.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/export/curved_file.h"
 #include "subvol/export/cutaway.h"
 #include "subvol/export/export.h"
@@ -138,8 +139,7 @@ std::vector<double> region_shades(const ShownMesh& mesh) {
   if (const auto* cells = std::get_if<VolumeMesh>(&mesh)) of_cell = cells->references;
   if (const auto* file = std::get_if<HighOrderFile>(&mesh)) of_cell = file->references;
   std::vector<int> all = of_cell;
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
+  sort_unique(all);
   std::vector<double> shades;
   if (all.size() < 2) return shades;
   for (const int reference : of_cell)

@@ -16,8 +16,8 @@ struct ReportPicture {
   std::string low, high;           ///< meanings of the two ends of the color scale; empty: no colors
 };
 
-/// Draws the meshes of a report: the surface, the mesh that was given, the result colored by distance to the surface and
-/// by quality, and the result cut open. If the result has a control cage, its limit surface is drawn.
+/// Draws the meshes of a report: the surface, the mesh that was given, the result colored by distance to the surface
+/// and by quality, and the result cut open. If the result has a control cage, its limit surface is drawn.
 ///
 /// notes    receives a line for every picture that could not be made, with the reason.
 std::vector<ReportPicture> report_pictures(const Json& report, const ReportMeshes& meshes,

@@ -51,8 +51,8 @@ void untangle_and_report(const std::string& path, const RunOptions& run, std::ve
 void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
                        std::vector<std::string>& warnings) {
   untangle_and_report(path, run, warnings, [&](const auto& progress, const auto& cancelled) {
-    options.progress = progress;
-    options.cancelled = cancelled;
+    options.control.progress = progress;
+    options.control.cancelled = cancelled;
     return untangle_before_fit(mesh, options);
   });
 }
@@ -60,11 +60,10 @@ void untangle_template(const std::string& path, const RunOptions& run, OptimizeO
 void untangle_template(const std::string& path, const RunOptions& run, const OptimizeOptions& options,
                        const VolumeMesh& labels, HighOrderMesh& mesh, std::vector<std::string>& warnings) {
   untangle_and_report(path, run, warnings, [&](const auto& progress, const auto& cancelled) {
-    return untangle_before_fit(mesh, labels,
-                               {.time_limit_seconds = options.time_limit_seconds,
-                                .progress = progress,
-                                .cancelled = cancelled,
-                                .log = options.log});
+    SolveControl control = options.control;
+    control.progress = progress;
+    control.cancelled = cancelled;
+    return untangle_before_fit(mesh, labels, {.control = control});
   });
 }
 

@@ -93,14 +93,11 @@ void AutomaticFitRun::fit() {
   AutomaticFitOptions options = arguments_.fit;
   if (arguments_.size) options.cells = cells_of_size(solid_boundary(surface()).volume, *arguments_.size);
   checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
-  options.log = checkpointing_->log();
+  options.control.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    options.regions = RegionRule::merge;  // they were found when the target was read
-    return regions_ ? fit_regions(*regions_, options) : fit_automatically(target_, options);
-  });
+  options.regions = RegionRule::merge;  // they were found when the target was read
+  result_ = followed(options.control,
+                     [&] { return regions_ ? fit_regions(*regions_, options) : fit_automatically(target_, options); });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
   groups_ = carry_groups(surface(), result_.mesh);

@@ -32,7 +32,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// --- What the verbs of a batch accept, from the parser ----------------------------------------------------------------
+// --- What the verbs of a batch accept, from the parser --------------------------------------------------------------
 
 /// Finds verbs and their options in the description of the program.
 class ParserVerbs {
@@ -68,7 +68,7 @@ class ParserVerbs {
   std::map<std::string, BatchVerb> verbs_;
 };
 
-// --- batch --------------------------------------------------------------------------------------------------------------
+// --- batch ----------------------------------------------------------------------------------------------------------
 
 struct BatchArguments {
   std::vector<std::string> words, rows, outputs;
@@ -142,7 +142,7 @@ int run_batch_verb(BatchArguments& arguments, ParserVerbs& parser_verbs) {
   return all_valid ? kDone : kNotConverged;
 }
 
-// --- batch report -------------------------------------------------------------------------------------------------------
+// --- batch report ---------------------------------------------------------------------------------------------------
 
 struct BatchReportArguments {
   std::vector<std::string> folders, before;
@@ -238,7 +238,7 @@ int run_batch_report(const BatchReportArguments& arguments) {
   return kDone;
 }
 
-// --- batch merge --------------------------------------------------------------------------------------------------------
+// --- batch merge ----------------------------------------------------------------------------------------------------
 
 struct MergeArguments {
   std::vector<std::string> folders;
@@ -261,7 +261,7 @@ int run_batch_merge(const MergeArguments& arguments) {
   return kDone;
 }
 
-// --- Options ------------------------------------------------------------------------------------------------------------
+// --- Options --------------------------------------------------------------------------------------------------------
 
 void add_report(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("report", "Show the results of a batch as a page");
@@ -275,7 +275,7 @@ void add_report(CLI::App& group, Action& action) {
   verb->add_flag("--json", arguments->json, "Print counts, quantiles and differences as JSON");
   verb->add_flag("--no-pictures", arguments->no_pictures, "Leave out the pictures of the worst results");
   verb->add_flag("--force", arguments->force, "Replace an existing page");
-  verb->add_flag("--quiet", arguments->quiet, "Say nothing");
+  verb->add_flag("--quiet", arguments->quiet, "Print nothing");
   verb->callback([arguments, &action] { action = [arguments] { return run_batch_report(*arguments); }; });
 }
 
@@ -347,8 +347,8 @@ void add_batch_command(CLI::App& app, Action& action) {
   arguments->options.jobs = 0;
   verb->add_option("MODELS", arguments->words,
                    "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs");
-  // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS, which
-  // comes first, receives them; this one shows them in the help.
+  // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS,
+  // which comes first, receives them; this one shows them in the help.
   verb->add_option("OPTIONS", arguments->words_for_all, "Options for every model, behind --");
   verb->add_option("-o,--output", arguments->folder, "Folder of the batch; it may exist")->type_name("FOLDER");
   verb->add_option("--row", arguments->rows, R"(A model as JSON: {"id": "bone", "input": "bone.off", "cells": 300})")
@@ -364,11 +364,11 @@ void add_batch_command(CLI::App& app, Action& action) {
   add_planning_options(*verb, *arguments);
   add_process_options(*verb, arguments->options);
   verb->add_option("--progress", arguments->options.progress,
-                   "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+                   "How progress is shown: bar (default on a terminal) or plain on stderr, json on stdout, none")
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
   verb->add_flag("--print", arguments->options.print_records, "Print the record of each model at the end");
-  verb->add_flag("--quiet", arguments->options.quiet, "Say nothing but errors");
+  verb->add_flag("--quiet", arguments->options.quiet, "Print only errors");
   add_report(*verb, action);
   add_batch_merge(*verb, action);
   verb->footer(kFooter);

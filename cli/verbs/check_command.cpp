@@ -195,7 +195,7 @@ void add_check_command(CLI::App& app, Action& action) {
                    "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");
   verb->add_option("--chord", arguments->chord_percent,
-                   "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")
+                   "A curved boundary is measured as triangles this close to it, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
@@ -205,7 +205,7 @@ void add_check_command(CLI::App& app, Action& action) {
   verb->add_flag("--json", arguments->json, "Print JSON instead of text");
   verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
   verb->add_flag("--force", arguments->run.force, "Replace a report that exists");
-  verb->add_flag("--quiet", arguments->run.quiet, "Say nothing but errors; the exit status tells");
+  verb->add_flag("--quiet", arguments->run.quiet, "Print only errors; the exit status says the rest");
   add_resource_options(*verb, arguments->run);
   verb->footer(R"(Exit status 0 if the mesh is valid (every cell proved positive, no defects), 1 if it is not.
 For a surface: 0 if it bounds a solid as it stands, 1 if it does not.

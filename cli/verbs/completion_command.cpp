@@ -52,7 +52,8 @@ std::vector<std::string> words_of(const CLI::Option& option) {
   return words;
 }
 
-/// Appends the lines of a case, for a pattern of the shell, that offer what a verb accepts: its options, the words of some, and the verbs below it.
+/// Appends the lines of a case, for a pattern of the shell, that offer what a verb accepts: its options, the words of
+/// some, and the verbs below it.
 void append_case(std::ostream& out, const CLI::App& verb, const std::string& pattern) {
   out << "    " << pattern << ")\n      options='" << joined(options_of(verb)) << "'\n      case \"$before\" in\n";
   for (const CLI::Option* option : verb.get_options())

@@ -119,8 +119,9 @@ void add_convert_command(CLI::App& app, Action& action) {
                  "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
   verb->add_option("--region", arguments->region, "Write the cells of this region only: its name or reference")
       ->type_name("NAME");
-  verb->add_option("--intervals", arguments->writing.linear_intervals,
-                   "Of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order")
+  verb->add_option(
+          "--intervals", arguments->writing.linear_intervals,
+          "Intervals of each edge of a curved cell that becomes linear ones (.mesh, .vtk); 0: the largest order")
       ->check(whole_number_in(0, 64))
       ->type_name("N")
       ->capture_default_str();
@@ -128,7 +129,7 @@ void add_convert_command(CLI::App& app, Action& action) {
   add_references_option(*verb, arguments->run);
   add_output_options(
       *verb, arguments->run,
-      "Where to, the extension choosing the format: " + output_formats() +
+      "Output, whose extension chooses the format: " + output_formats() +
           "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
           "their groups; may be given several times");
   verb->get_option("--output")->required();

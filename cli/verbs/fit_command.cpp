@@ -86,7 +86,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str();
   verb.add_option(
           "--tolerance", fit.tolerance_percent,
-          "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
+          "Mean distance to reach, in percent of the diagonal of the target's bounding box; exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--max-tolerance", arguments.max_tolerance_percent,
@@ -191,8 +191,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
   if (verb.count("--levels") > 0) fit.levels = arguments.fit.levels;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
-  fit.max_iterations = arguments.fit.max_iterations;
-  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.control = arguments.fit.control;
   result.unused_options = {"basis", "map-tolerance", "adaptive"};
   for (const std::string option : kMethodOptions) result.unused_options.push_back(option.substr(2));
   if (!fit.makes_cage) result.unused_options.push_back("levels");
@@ -217,8 +216,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.correspondence = correspondence(arguments);
   fit.point_weights = point_weights(arguments);
   fit.distortion = distortion(arguments);
-  fit.max_iterations = arguments.fit.max_iterations;
-  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.control = arguments.fit.control;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
 }
@@ -257,7 +255,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   const auto group = "Solver";
   verb.add_option("--lambda-far", fit.lambda_far,
-                  "Largest weight of the cells' shape to which the way from one level to the next may raise it")
+                  "Upper limit of the weight of the cells' shape while a level is started")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
@@ -265,7 +263,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_option(
           "--lambda-close", fit.lambda_close,
           "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
-          "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, or\n"
+          "(0.015 if none is given) and falls by more than the cells' distortion rises. With --order: 0.05, or\n"
           "0.0025 if creases follow nearly all sharp edges, lowered for a --tolerance and volumes of regions")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
@@ -277,7 +275,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->group(group);
   verb.add_option("--correspondence", arguments.correspondence,
-                  "What pulls at what: exact closest points both ways, or the restricted Voronoi cells of the paper")
+                  "How correspondences are chosen: exact closest points both ways, or the restricted Voronoi cells of "
+                  "the paper")
       ->check(CLI::IsMember({"closest", "voronoi"}))
       ->type_name("closest|voronoi")
       ->capture_default_str()
@@ -290,16 +289,17 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->group(group);
   verb.add_option(
           "--point-weights", arguments.point_weights,
-          "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
+          "How much each point of a cloud counts: all alike, or by the area that it represents, for uneven scans")
       ->check(CLI::IsMember({"equal", "area"}))
       ->type_name("equal|area")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
+  verb.add_option("--max-iterations", fit.control.max_iterations,
+                  "Steps per stage (default: as many as the schedule asks for)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N")
       ->group(group);
-  verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
+  verb.add_option("--time-limit", fit.control.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS")
       ->group(group);

@@ -99,7 +99,7 @@ void HighOrderFitRun::load_target() {
 
 void HighOrderFitRun::prepare_template() {
   AutomaticFitOptions making = arguments_.template_fit;
-  making.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
+  making.control.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.control.time_limit_seconds;
   template_ = load_template(arguments_.template_mesh, target_, making, run_, warnings_, TemplateUse::curved_cells);
   if (!template_.made) warn_of_losses(marks_of(template_.mesh), marks_of(template_.mesh), outputs_, warnings_, true);
   tell_warnings();
@@ -134,7 +134,8 @@ void HighOrderFitRun::describe_input() {
 }
 
 void HighOrderFitRun::untangle() {
-  const OptimizeOptions options{.time_limit_seconds = arguments_.fit.time_limit_seconds, .log = checkpointing_->log()};
+  const OptimizeOptions options{
+      .control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds, .log = checkpointing_->log()}};
   const std::string& path = arguments_.template_mesh.path;
   try {
     if (template_.curved)
@@ -150,13 +151,11 @@ void HighOrderFitRun::untangle() {
 
 void HighOrderFitRun::fit() {
   HighOrderFitOptions options = arguments_.fit;
-  options.log = checkpointing_->log();
+  options.control.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
-  if (options.time_limit_seconds > 0)
-    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
-  options.cancelled = interrupted;
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
+  if (options.control.time_limit_seconds > 0)
+    options.control.time_limit_seconds = std::max(1e-3, options.control.time_limit_seconds - seconds());
+  result_ = followed(options.control, [&] {
     if (template_.curved)
       return fit_high_order(std::get<TriangleMesh>(target_), *template_.curved, template_.mesh, options);
     return std::visit([&](const auto& target) { return fit_high_order(target, template_.mesh, options); }, target_);

@@ -7,6 +7,7 @@
 #include "cli/runs/progress.h"
 #include "cli/runs/run_options.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 
 #include <CLI/CLI.hpp>
 
@@ -42,16 +43,19 @@ class LongRun {
     (static_cast<Run*>(this)->*work)();
     seconds_[part] = seconds_since(begin);
   }
-  /// Calls work(progress), which reports progress as the options say and is interrupted by Ctrl-C. As long as there
-  /// is no result to save (`precedes_result`), and after the work, a signal ends the program at once.
+  /// Calls work(), a solve with this control: it reports progress as the options say and is interrupted by Ctrl-C. As
+  /// long as there is no result to save (`precedes_result`), and after the work, a signal ends the program at once.
   template <class Work>
-  auto followed(const Work& work) const {
+  auto followed(SolveControl& control, const Work& work) const {
     ProgressTeller teller(run_.progress, run_.quiet);
-    auto result = work([&](const FitProgress& progress) {
+    control.cancelled = interrupted;
+    control.progress = [&](const FitProgress& progress) {
       if (!precedes_result(progress.stage)) catch_interrupt();
       teller.tell(progress);
       return !interrupted();
-    });
+    };
+    auto result = work();
+    control.progress = nullptr;  // it must not outlive the teller
     teller.finish();
     if (!interrupted()) end_on_interrupt();
     return result;

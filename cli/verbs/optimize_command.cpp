@@ -37,7 +37,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->type_name("DEGREES")
       ->capture_default_str();
   verb.add_option("--tolerance", optimize.mean_tolerance_percent,
-                  "Mean distance from the surface to keep within, in per cent of the diagonal of its bounding box;\n"
+                  "Mean distance from the surface to keep within, in percent of the diagonal of its bounding box;\n"
                   "exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT")
@@ -57,11 +57,12 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str();
-  verb.add_option("--max-iterations", optimize.max_iterations,
+  verb.add_option("--max-iterations", optimize.control.max_iterations,
                   "Steps per stage (default: as many as the schedule asks for)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
-  verb.add_option("--time-limit", optimize.time_limit_seconds, "Stop after this time with the best result so far")
+  verb.add_option("--time-limit", optimize.control.time_limit_seconds,
+                  "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
   const auto group = "Curved elements";
@@ -103,7 +104,7 @@ void add_optimize_command(CLI::App& app, Action& action) {
   subvol optimize tangled.mesh -o valid.mesh --report valid.json
   subvol optimize tets.mesh --order 3 --target part.off -o curved.vtu
 
-What is written is checked: exit status 1 where a cell is not proved positive or the boundary meets itself.
+What is written is checked: exit status 1 if a cell is not proved positive or the boundary meets itself.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
   verb->callback(
       [arguments, verb, &action] { action = [arguments, verb] { return run_optimize(*arguments, *verb); }; });

@@ -32,18 +32,12 @@ CurvedOptimizeRun::CurvedOptimizeRun(const OptimizeArguments& arguments, const L
 void CurvedOptimizeRun::optimize() {
   before_ = measure_quality(file_.mesh);
   const OptimizeOptions& asked = arguments_.optimize;
-  CurvedOptimizeOptions options{.fixed_boundary = asked.fixed_boundary,
-                                .quality = asked.quality,
-                                .max_iterations = asked.max_iterations,
-                                .time_limit_seconds = asked.time_limit_seconds};
+  CurvedOptimizeOptions options{
+      .fixed_boundary = asked.fixed_boundary, .quality = asked.quality, .control = asked.control};
   const VolumeMesh labels = labels_of(file_);
   checkpointing_.emplace(run_, run_identity(verb_, {{"mesh", fingerprint(labels)}}));
-  options.log = checkpointing_->log();
-  CurvedOptimizeResult result = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    return optimize_curved(file_.mesh, labels, options);
-  });
+  options.control.log = checkpointing_->log();
+  CurvedOptimizeResult result = followed(options.control, [&] { return optimize_curved(file_.mesh, labels, options); });
   checkpointing_->finish(result.report.warnings);
   add_warnings(result.report.warnings);
   file_.mesh = std::move(result.mesh);

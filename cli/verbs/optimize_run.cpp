@@ -46,8 +46,7 @@ HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, cons
   fit.crease_angle_degrees = arguments.optimize.crease_angle_degrees;
   fit.follows_all_edges = verb.count("--crease-angle") > 0;
   fit.lambda_close = verb.count("--lambda") > 0 ? arguments.optimize.lambda : kCurvingLambda;
-  fit.max_iterations = arguments.optimize.max_iterations;
-  fit.time_limit_seconds = arguments.optimize.time_limit_seconds;
+  fit.control = arguments.optimize.control;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
 }
@@ -101,12 +100,8 @@ void OptimizeRun::optimize() {
   std::vector<std::pair<std::string, std::string>> inputs{{"mesh", fingerprint(mesh_)}};
   if (target_) inputs.emplace_back("target", fingerprint(*target_));
   checkpointing_.emplace(run_, run_identity(verb_, inputs));
-  options.log = checkpointing_->log();
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    return optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options);
-  });
+  options.control.log = checkpointing_->log();
+  result_ = followed(options.control, [&] { return optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options); });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
   if (target_) groups_ = carry_groups(*target_, result_.mesh);

@@ -60,14 +60,14 @@ int run_report(const ReportArguments& arguments) {
 void add_report_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("report", "Show a report as a page with a viewer, pictures and plots");
   const auto arguments = std::make_shared<ReportArguments>();
-  verb->add_option("REPORT", arguments->report, "What --report has written")->required()->type_name("FILE.json");
+  verb->add_option("REPORT", arguments->report, "Report that --report has written")->required()->type_name("FILE.json");
   verb->add_option("-o,--output", arguments->output, "The page: one file that needs nothing else")
       ->required()
       ->type_name("FILE.html");
   verb->add_flag("--no-pictures", arguments->no_pictures, "Leave out the viewer and the pictures: the meshes need not be there");
   verb->add_flag("--no-viewer", arguments->no_viewer, "Leave out the viewer: a page without scripts, of pictures only");
   verb->add_flag("--force", arguments->force, "Replace an existing file");
-  verb->add_flag("--quiet", arguments->quiet, "Say nothing");
+  verb->add_flag("--quiet", arguments->quiet, "Print nothing");
   verb->footer(R"(Example:
   subvol fit bone.off --template bone.mesh -o bone.mesh --report bone.json
   subvol report bone.json -o bone.html

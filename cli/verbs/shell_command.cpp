@@ -142,11 +142,7 @@ void ShellRun::grow() {
     if (arguments_.crease_angle_degrees)
       options.tags = surface_features(surface_.polygons, *arguments_.crease_angle_degrees);
     take_surface(surface_, options);
-    result_ = followed([&](auto progress) {
-      options.progress = progress;
-      options.cancelled = interrupted;
-      return make_shell(surface_.polygons, options);
-    });
+    result_ = followed(options.control, [&] { return make_shell(surface_.polygons, options); });
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
   }
@@ -179,17 +175,13 @@ void ShellRun::curve() {
   }
   CurvedShellOptions options{.order = arguments_.order,
                              .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
-                             .max_iterations = arguments_.shell.max_iterations};
-  if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
-    options.time_limit_seconds = std::max(1e-3, limit - seconds());
+                             .control = {.max_iterations = arguments_.shell.control.max_iterations}};
+  if (const double limit = arguments_.shell.control.time_limit_seconds; limit > 0)
+    options.control.time_limit_seconds = std::max(1e-3, limit - seconds());
   options.boundary = [&](const HighOrderMesh& mesh) {
     return curved_boundary(mesh, measured_chord_percent(arguments_.writing));
   };
-  curved_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
-    return curve_shell(result_, options);
-  });
+  curved_ = followed(options.control, [&] { return curve_shell(result_, options); });
   take_figures(*curved_, result_);
   add_warnings(curved_->report.warnings);
 }
@@ -335,7 +327,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->check(whole_number_in(1, 1000))
       ->type_name("N")
       ->capture_default_str();
-  verb.add_option("--growth", shell.growth, "Thickness of a layer against that of the one nearer the surface")
+  verb.add_option("--growth", shell.growth, "Thickness of a layer relative to that of the next one toward the surface")
       ->check(number_in(0.01, 100.0))
       ->type_name("FACTOR")
       ->capture_default_str();
@@ -354,15 +346,15 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->allow_extra_args(false)
       ->type_name("PATCH");
   verb.add_option("--repair", arguments.repair,
-                  "Faults of the surface are repaired by changes within this distance, a length or 2%; 0: none are")
+                  "Faults of the surface are repaired by changes within this distance, a length or 2%; 0: no repair")
       ->type_name("DISTANCE")
       ->capture_default_str();
-  verb.add_option("--side", arguments.side, "Where the faces' normals point, or against them")
+  verb.add_option("--side", arguments.side, "Along the normals of the faces, against them, or both")
       ->check(CLI::IsMember({"outward", "inward", "both"}))
       ->type_name("outward|inward|both")
       ->capture_default_str();
   verb.add_flag("--free-surface", shell.free_surface,
-                "Let the surface's vertices slide along it for the cells' sake; its border and creases stay");
+                "Let the surface's vertices slide along it for better cells; its border and creases stay");
   verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimization");
   verb.add_option("--crease-angle", arguments.crease_angle_degrees,
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
@@ -379,10 +371,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->capture_default_str()
       ->needs(order);
   add_map_tolerance(verb, arguments.writing)->needs(order);
-  verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
+  verb.add_option("--max-iterations", shell.control.max_iterations, "Steps per solve (default: 60)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
-  verb.add_option("--time-limit", shell.time_limit_seconds, "Stop after this time with the best result so far")
+  verb.add_option("--time-limit", shell.control.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
 }
@@ -406,7 +398,7 @@ void add_shell_command(CLI::App& app, Action& action) {
   verb->footer(R"(Example:
   subvol shell bone.off --thickness 2% --layers 3 --side both -o bone_shell.vtu -o bone_shell.glb
 
-Where there is no room the shell gets thinner; the report and the files tell where. What is written is checked:
+The shell is thinner where there is no room; the report and the files say where. What is written is checked:
 every cell certified, no sheet meeting another; otherwise exit status 1.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
   verb->callback([arguments, verb, &action] {

@@ -74,12 +74,13 @@ void SubdivisionFitRun::load() {
 
 void SubdivisionFitRun::load_template() {
   AutomaticFitOptions options = arguments_.template_fit;
-  options.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
+  options.control.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.control.time_limit_seconds;
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
     untangle_template(arguments_.template_mesh.path, arguments_.run,
-                      {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
+                      {.control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds}}, template_mesh_,
+                      warnings_);
   made_ = std::move(loaded.made);
   require_regions(outputs_, regions_of(template_mesh_));
   FittedTarget fitted = fitted_target(target_, template_mesh_);
@@ -94,15 +95,13 @@ void SubdivisionFitRun::fit() {
   FitOptions options = arguments_.fit;
   checkpointing_.emplace(
       run_, run_identity(verb_, {{"target", fingerprint(target_)}, {"template", fingerprint(template_mesh_)}}));
-  options.log = checkpointing_->log();
+  options.control.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // Making the template may have used part of the time limit.
-  if (options.time_limit_seconds > 0)
-    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
-  result_ = followed([&](auto progress) {
-    options.progress = progress;
-    options.cancelled = interrupted;
+  if (options.control.time_limit_seconds > 0)
+    options.control.time_limit_seconds = std::max(1e-3, options.control.time_limit_seconds - seconds());
+  result_ = followed(options.control, [&] {
     return std::visit([&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); },
                       target_);
   });

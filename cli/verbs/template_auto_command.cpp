@@ -149,7 +149,7 @@ void add_template_auto(CLI::App& group, Action& action) {
                        "; a volume mesh, for its boundary; or a segmentation: " + label_grid_formats())
       ->required()
       ->type_name("FILE");
-  verb->add_option("--cells", arguments->options.cells, "About how many cells; more where the topology needs them")
+  verb->add_option("--cells", arguments->options.cells, "Approximate number of cells; more if the topology needs them")
       ->check(whole_number_in(kLeastTemplateCells, kMostTemplateCells))
       ->type_name("N")
       ->capture_default_str();
@@ -161,7 +161,7 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->type_name("SECONDS");
   add_template_options(*verb, *arguments);
   verb->add_option("--progress", arguments->run.progress,
-                   "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+                   "How progress is shown: bar (default on a terminal) or plain on stderr, json on stdout, none")
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
   verb->footer(

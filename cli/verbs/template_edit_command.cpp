@@ -200,9 +200,11 @@ int run_edit(EditArguments arguments, const CLI::App& verb, Maker make) {
 }
 
 /// Adds a verb with the options common to all edits; its own options follow.
+/// example  arguments of the verb.
 CLI::App* add_edit(CLI::App& group, Action& action, const std::shared_ptr<EditArguments>& arguments, const char* name,
-                   const char* help, Maker make) {
+                   const char* help, Maker make, const std::string& example) {
   CLI::App* verb = group.add_subcommand(name, help);
+  verb->footer("Example:\n  subvol template " + std::string(name) + " " + example);
   add_template_options(*verb, *arguments);
   verb->callback([arguments, verb, make, &action] {
     action = [arguments, verb, make] { return run_edit(*arguments, *verb, make); };
@@ -237,17 +239,19 @@ CLI::Option* add_vertices(CLI::App& verb, EditArguments& arguments, const char* 
 
 void add_grid(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "grid", "Fill a box with equal hexes", make_grid);
+  CLI::App* verb =
+      add_edit(group, action, a, "grid", "Fill a box with equal hexes", make_grid, "bone.off --size 2 -o grid.mesh");
   verb->add_option("SURFACE", a->mesh, "Take the box around this surface")->type_name("FILE");
   CLI::Option* box = add_box(*verb, *a, "Or take this box");
   verb->add_option("--counts", a->counts, "Cells along each axis")
       ->expected(3)
       ->check(whole_number_in(1, 100'000))
       ->type_name("NX NY NZ");
-  verb->add_option("--size", a->size, "Or: about how long a cell is")
+  verb->add_option("--size", a->size, "Or the approximate length of a cell")
       ->check(number_in(1e-300, 1e300))
       ->type_name("LENGTH");
-  verb->add_option("--margin", a->margin, "How far the box stands off the surface, in per cent of its diagonal")
+  verb->add_option("--margin", a->margin,
+                   "Distance between the surface and the box, in percent of the surface's diagonal")
       ->check(number_in(0.0, 1000.0))
       ->type_name("PERCENT")
       ->capture_default_str()
@@ -259,7 +263,7 @@ void add_choice(CLI::App& verb, EditArguments& arguments) {
   CLI::Option* inside =
       verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
           ->type_name("SURFACE");
-  verb.add_option("--share", arguments.share, "By at least this share of their volume")
+  verb.add_option("--share", arguments.share, "Least share of a cell's volume that must lie inside")
       ->check(number_in(1e-6, 1.0))
       ->type_name("SHARE")
       ->capture_default_str()
@@ -270,7 +274,8 @@ void add_choice(CLI::App& verb, EditArguments& arguments) {
 
 void add_carve(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "carve", "Keep some cells", make_carved);
+  CLI::App* verb =
+      add_edit(group, action, a, "carve", "Keep some cells", make_carved, "grid.mesh --inside bone.off -o core.mesh");
   add_mesh(*verb, *a);
   add_choice(*verb, *a);
   verb->add_flag("--invert", a->invert, "Keep the others instead");
@@ -279,46 +284,49 @@ void add_carve(CLI::App& group, Action& action) {
 void add_refine(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
   CLI::App* verb = add_edit(group, action, a, "refine", "Cut some hexes in 27, and those around so that they fit",
-                            make_refined);
+                            make_refined, "core.mesh --thin -o finer.mesh");
   add_mesh(*verb, *a);
   add_choice(*verb, *a);
-  verb->add_flag("--thin", a->thin, "Cells that are all there is between two sides of the mesh");
+  verb->add_flag("--thin", a->thin, "Cells that alone separate two sides of the mesh");
 }
 
 void add_extrude(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb =
-      add_edit(group, action, a, "extrude", "Stack hexes and prisms on the faces of a surface", make_extruded);
+  CLI::App* verb = add_edit(group, action, a, "extrude", "Stack hexes and prisms on the faces of a surface",
+                            make_extruded, "plate.obj --thickness 3 --layers 2 -o slab.mesh");
   verb->add_option("SURFACE", a->mesh, "Surface of triangles and quads: " + surface_formats())
       ->required()
       ->type_name("FILE");
-  verb->add_option("--thickness", a->thickness, "Of all layers together")
+  verb->add_option("--thickness", a->thickness, "Thickness of all layers together")
       ->required()
       ->check(number_in(1e-300, 1e300))
       ->type_name("LENGTH");
-  verb->add_option("--layers", a->layers, "How many")
+  verb->add_option("--layers", a->layers, "Number of layers")
       ->check(whole_number_in(1, 10'000))
       ->type_name("N")
       ->capture_default_str();
-  verb->add_option("--growth", a->growth, "Thickness of a layer against the one below")
-      ->check(number_in(0.01, 100.0))->type_name("FACTOR")->capture_default_str();
-  verb->add_option("--direction", a->direction, "Where to (default: along the surface's normals)")
+  verb->add_option("--growth", a->growth, "Thickness of a layer relative to that of the one below")
+      ->check(number_in(0.01, 100.0))
+      ->type_name("FACTOR")
+      ->capture_default_str();
+  verb->add_option("--direction", a->direction, "Direction of the columns (default: along the surface's normals)")
       ->expected(3)
       ->type_name("X Y Z");
 }
 
 void add_pillow(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "pillow",
-                            "Put a layer of cells inside the boundary, or around some cells", make_pillowed);
+  CLI::App* verb =
+      add_edit(group, action, a, "pillow", "Put a layer of cells inside the boundary, or around some cells",
+               make_pillowed, "core.mesh -o template.mesh");
   add_mesh(*verb, *a);
   add_cell_list(*verb, *a, "Around these cells, numbered from 0 (default: all)");
 }
 
 void add_collapse(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb =
-      add_edit(group, action, a, "collapse", "Take cells out by shrinking a sheet, a face or an edge", make_collapsed);
+  CLI::App* verb = add_edit(group, action, a, "collapse", "Take cells out by shrinking a sheet, a face or an edge",
+                            make_collapsed, "template.mesh --vertices 0 1 -o coarser.mesh");
   add_mesh(*verb, *a);
   verb->add_option("--what", a->what,
                    "The sheet of edge A B; the quad with opposite corners A B, and its column; the edge A B")
@@ -330,12 +338,12 @@ void add_collapse(CLI::App& group, Action& action) {
 
 void add_merge(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb =
-      add_edit(group, action, a, "merge", "Glue faces that lie on each other, of one mesh or two", make_merged);
+  CLI::App* verb = add_edit(group, action, a, "merge", "Glue faces that lie on each other, of one mesh or two",
+                            make_merged, "left.mesh right.mesh -o both.mesh");
   add_mesh(*verb, *a);
-  verb->add_option("OTHER", a->other, "Mesh to put beside it first")->type_name("FILE");
+  verb->add_option("OTHER", a->other, "Second mesh, whose cells are added first")->type_name("FILE");
   verb->add_option("--tolerance", a->tolerance,
-                   "Distance up to which vertices are one, in per cent of the box's diagonal")
+                   "Distance up to which vertices are one, in percent of the box's diagonal")
       ->check(number_in(0.0, 10.0))
       ->type_name("PERCENT")
       ->capture_default_str();
@@ -344,13 +352,13 @@ void add_merge(CLI::App& group, Action& action) {
 void add_split(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
   a->what = "parts";
-  CLI::App* verb =
-      add_edit(group, action, a, "split", "Cut a sheet into layers, or all cells into prisms or tets", make_split);
+  CLI::App* verb = add_edit(group, action, a, "split", "Cut a sheet into layers, or all cells into prisms or tets",
+                            make_split, "template.mesh --into tets -o tets.mesh");
   add_mesh(*verb, *a);
   verb->add_option("--into", a->what, "Layers of the sheet of an edge; prisms along an edge; tets")
       ->check(CLI::IsMember({"parts", "prisms", "tets"}))->type_name("parts|prisms|tets")->capture_default_str();
   add_vertices(*verb, *a, "--edge", "Ends of the edge, numbered from 0");
-  verb->add_option("--parts", a->parts, "Into how many layers")
+  verb->add_option("--parts", a->parts, "Number of layers into which the sheet is cut")
       ->check(whole_number_in(2, 1000))
       ->type_name("N")
       ->default_str(std::to_string(kUsualParts));

@@ -64,14 +64,14 @@ void add_resource_options(CLI::App& verb, RunOptions& options) {
       ->check(whole_number_in(1, 1024))
       ->type_name("N");
   add_memory_limit(verb, options.memory_limit,
-                   "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
-                   "result so far");
+                   "Most memory to use: bytes, or 800M, 4G. A fit ends with the best result so far before a level\n"
+                   "that would need more");
 }
 
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help) {
   verb.add_option("-o,--output", options.outputs, output_help)->type_name("FILE")->allow_extra_args(false);
   verb.add_flag("--force", options.force, "Replace outputs that exist");
-  verb.add_flag("--quiet", options.quiet, "Say nothing but errors");
+  verb.add_flag("--quiet", options.quiet, "Print only errors");
   add_resource_options(verb, options);
 }
 
@@ -116,7 +116,7 @@ CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {
   return verb
       .add_option("--map-tolerance", options.map_tolerance_percent,
                   "Largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, in\n"
-                  "per cent of the diagonal; if it is larger, the program says so and ends with status 4")
+                  "percent of the diagonal; if it is larger, the program says so and ends with status 4")
       ->check(number_in(0.0, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
@@ -126,10 +126,10 @@ void add_long_run_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--report", options.report, "Write what was done and what is true of the result")
       ->type_name("FILE.json");
   verb.add_option("--progress", options.progress,
-                  "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+                  "How progress is shown: bar (default on a terminal) or plain on stderr, json on stdout, none")
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
-  verb.add_option("--seed", options.seed, "Kept in the report; nothing here draws random numbers")->type_name("N");
+  verb.add_option("--seed", options.seed, "Recorded in the report; nothing here draws random numbers")->type_name("N");
 }
 
 void require_fitting_options(const CLI::App& verb, bool points) {
@@ -161,7 +161,7 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
       verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as the run goes on")
           ->type_name("FILE")
           ->group(group);
-  verb.add_option("--every", options.every_seconds, "Write the checkpoint at most so often")
+  verb.add_option("--every", options.every_seconds, "Least time between two writes of the checkpoint")
       ->check(number_in(0, 1e9))
       ->type_name("SECONDS")
       ->capture_default_str()
@@ -185,7 +185,7 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,
-                  "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
+                  "Largest distance between a limit surface and its triangles, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str()
@@ -206,8 +206,8 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
             if (const std::string error = parse_cut(text, options.cut); !error.empty())
               throw CLI::ValidationError("--cut", error);
           },
-          "Where cutaway:FILE cuts: the axis the plane stands across, and where along it (default: the axis along\n"
-          "which the mesh is shortest, halfway)")
+          "Plane of cutaway:FILE: the axis that it is perpendicular to, and its place between the outermost cells,\n"
+          "from 0 to 1 (default: the axis along which the mesh is shortest, and 0.5)")
       ->type_name("x|y|z[:SHARE]")
       ->group(group);
   verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")

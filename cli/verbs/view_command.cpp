@@ -138,13 +138,13 @@ void add_view_command(CLI::App& app, Action& action) {
       ->type_name("SURFACE");
   verb->add_flag("--limit", arguments->viewing.limit, "The mesh is a control cage: show its limit surface, too");
   verb->add_option("--chord", arguments->viewing.chord_percent,
-                   "Largest distance of the drawn limit surface from the true one, in per cent of its box's diagonal")
+                   "Largest distance of the drawn limit surface from the true one, in percent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
   add_references_option(*verb, arguments->run);
   verb->add_flag("--force", arguments->run.force, "Replace an existing file");
-  verb->add_flag("--quiet", arguments->run.quiet, "Say nothing");
+  verb->add_flag("--quiet", arguments->run.quiet, "Print nothing");
   add_resource_options(*verb, arguments->run);
   verb->footer(R"(The page works without network. Curved cells are drawn curved, inverted ones are marked.
 

@@ -16,8 +16,10 @@ enum class CellValidity : std::uint8_t {
   invalid,   ///< refuted by a point where det J < 0 beyond rounding
   undecided  ///< neither within the limits, e.g. if det J touches 0 or a coordinate is not finite
 };
+/// Returns "valid", "invalid" or "undecided".
 const char* to_string(CellValidity validity);
 
+/// Limits of the search for a proof.
 struct CertificateOptions {
   int max_depth = 10;    ///< bisections of a cell per direction, 0 to 50; 0: its own coefficients only
   int max_boxes = 4096;  ///< boxes examined per cell (linear cells: up to 7 more); >= 1
@@ -57,12 +59,14 @@ CellCertificate certify_cell(CellKind kind, std::span<const Vec3> corners, const
 /// above.
 double min_bernstein(CellKind kind, std::span<const Vec3> corners);
 
+/// The verdicts on all cells of a mesh.
 struct CertificateSummary {
   std::size_t certified = 0, invalid = 0, undecided = 0;
   std::vector<Index> not_certified;  ///< cells that are invalid or undecided, ascending
   std::vector<Index> invalid_cells;  ///< those of them that are invalid, ascending
   bool all_certified() const { return not_certified.empty(); }
 };
+/// Counts the verdicts on cells.
 CertificateSummary summarize(std::span<const CellValidity> cells);
 
 /// Certifies all cells of a mesh at the given positions (e.g. those of a trial step) instead of the mesh's own.

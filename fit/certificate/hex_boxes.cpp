@@ -70,6 +70,7 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   inverse_mean_edges_ = mean_edges_.cwiseInverse();
   make_weights();
   contraction_.take_steps();
+  // Products of three such numbers are still within single precision, which ends at 1e-38 and 1e38.
   constexpr double kMost = 1e10;
   const double total = contraction_.total().maxCoeff();
   fits_single_ = total < kMost && total > 1 / kMost;
@@ -248,6 +249,7 @@ double HexBoxes::narrow_error_size(const Box& box) const {
 }
 
 std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
+  // Least error that is asked for, and the share of the error allowed that single precision may use up.
   constexpr double kLeast = 1e-9, kNarrowShare = 0.25;
   if (lowest != -std::numeric_limits<double>::infinity())
     box.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);

@@ -59,6 +59,7 @@ class HexBoxes {
     CoefficientsPool<Wide>::Pooled coefficients;
     CoefficientsPool<Narrow>::Pooled narrow;
   };
+  // Three bisections, one in each direction, make a depth. There are no models of deeper parts.
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = LineModels::kMaxLevel;
 
   HexBoxes(Basis basis, int order);

@@ -43,7 +43,7 @@ double log_slope_derivative(Basis basis, int i, int k) {
 /// Returns a close upper bound of |phi_i|: between neighboring samples a function exceeds the larger one by at most
 /// (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
 double largest_integrated_legendre(int i) {
-  constexpr int kSamples = 2000;
+  constexpr int kSamples = 2000;  // the bound then exceeds the maximum by less than 1e-4
   long double largest = 0;
   for (int k = 1; k < kSamples; ++k)
     largest = std::max(largest, std::abs(mode_value(Basis::legendre, i, static_cast<long double>(k) / kSamples)));
@@ -66,7 +66,7 @@ const LineModels& LineModels::get(Basis basis, int order, int degree) {
 
 LineModels::LineModels(Basis basis, int order, int degree) : basis_(basis), order_(order), degree_(degree) {
   bounds_[0] = bounds_[1] = slope_bounds_[0] = slope_bounds_[1] = 1;
-  constexpr double kUp = 1 + 1e-14;
+  constexpr double kUp = 1 + 1e-14;  // more than the rounding of the bounds
   for (int i = 1; i < order; ++i) {
     const bool fourier = basis == Basis::fourier;
     bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : largest_integrated_legendre(i));

@@ -246,6 +246,7 @@ bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
 
 /// Largest error allowed if the lowest relative det J is this; -infinity: it is unknown.
 double SimplexBoxes::wanted_error(double lowest) const {
+  // The error may be kShare of the lowest determinant, at most of kGood, relative to the cell's mean determinant.
   constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
   if (lowest == -std::numeric_limits<double>::infinity()) return small_error_;
   return std::max(kShare * std::min(lowest, kGood), kLeast);

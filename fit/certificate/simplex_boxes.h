@@ -40,6 +40,7 @@ class SimplexBoxes {
     std::shared_ptr<const std::vector<Layer>> layers;  ///< bounds and errors of these models
     AlignedDoubles control;           ///< control points: at alpha lanes_ + row num_layers_ + k
   };
+  // Three bisections halve all edges. At the greatest depth, these have 1e-6 of their length.
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
 
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);

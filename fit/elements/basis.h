@@ -15,7 +15,7 @@ enum class Basis { fourier, legendre };
 /// Orders range from 1 (vertices only) to this; order p has the modes phi_1 .. phi_{p-1}.
 inline constexpr int kMaxOrder = 16;
 
-/// +1 if phi_i is symmetric about 1/2 (i odd), -1 if it is antisymmetric.
+/// Returns +1 if phi_i is symmetric about 1/2 (i odd), -1 if it is antisymmetric.
 inline constexpr int mode_parity(int i) { return i % 2 ? 1 : -1; }
 
 /// Computes the p + 1 functions N_0 = 1 - x, N_1 = x, N_{i+1} = phi_i and their derivatives at x in [0, 1].
@@ -30,7 +30,7 @@ void line_functions(Basis basis, int order, double x, double* values, double* de
 /// small numbers. values, derivatives: order - 1 entries each.
 void mode_kernels(Basis basis, int order, double x, double* values, double* derivatives);
 
-/// "fourier", "legendre".
+/// Returns "fourier" or "legendre".
 const char* to_string(Basis basis);
 
 }  // namespace subvol

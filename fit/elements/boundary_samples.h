@@ -41,8 +41,9 @@ BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals,
 BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Index> faces, int intervals,
                                   std::span<const Index> edges = {});
 
-/// Samples the boundary and the interfaces between regions (cells of different references). The normals of an interface's
-/// triangles point from the smaller to the larger reference. Without interfaces: as `make_boundary_samples`.
+/// Samples the boundary and the interfaces between regions (cells of different references). The normals of an
+/// interface's triangles point from the smaller to the larger reference. Without interfaces: as
+/// `make_boundary_samples`.
 ///
 /// mesh     the mesh that the space was made of, with its references.
 /// creases  edges of the boundary or of interfaces. InputError: as above.

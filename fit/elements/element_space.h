@@ -72,7 +72,7 @@ class ElementSpace {
 
   std::size_t num_vertices() const { return topology().num_vertices(); }
   std::size_t num_nodes() const { return cell_nodes_.back(); }
-  /// First node of an edge, face or cell; its modes follow in the order of `for_each_mode`.
+  /// Return the first node of an edge, face or cell; its modes follow in the order of `for_each_mode`.
   std::size_t edge_nodes(std::size_t e) const { return edge_nodes_[e]; }
   std::size_t face_nodes(std::size_t f) const { return face_nodes_[f]; }
   std::size_t cell_nodes(std::size_t c) const { return cell_nodes_[c]; }
@@ -81,7 +81,7 @@ class ElementSpace {
   /// the opposite corner, the corner that j runs to.
   const std::array<Index, 4>& face_frame(std::size_t f) const { return cells_->face_frames[f]; }
 
-  /// All nodes of a cell and their signs, in the order of its pattern's modes.
+  /// Return all nodes of a cell and their signs, in the order of its pattern's modes.
   std::span<const Index> nodes(std::size_t c) const {
     return {nodes_.data() + offsets_[c], offsets_[c + 1] - offsets_[c]};
   }
@@ -96,7 +96,7 @@ class ElementSpace {
   std::span<const LocalMode> pattern_modes(std::size_t p) const {
     return {pattern_modes_.data() + pattern_offsets_[p], pattern_offsets_[p + 1] - pattern_offsets_[p]};
   }
-  /// Largest order among a pattern's edges, faces and cell; among all patterns.
+  /// Return the largest order among a pattern's edges, faces and cell, and that among all patterns.
   int pattern_order(std::size_t p) const { return pattern_orders_[p]; }
   int max_order() const;
 

@@ -15,6 +15,7 @@ using namespace internal;
 
 namespace {
 
+/// Value of a mode that counts as 0, and how far outside the cell canonical coordinates may be.
 constexpr double kZeroWeight = 1e-15, kOutside = 1e-9;
 
 bool is_inside(CellKind kind, const Vec3& p) {

@@ -16,18 +16,19 @@ struct HighOrderMesh {
 
   /// InputError: the number of coefficients differs from that of the nodes.
   HighOrderMesh(ElementSpace space, std::vector<Vec3> coefficients);
-  /// The straight-sided mesh in a space of any orders: modes are zero. InputError: the space has another number of
-  /// vertices.
+  /// Makes the straight-sided mesh in a space of any orders: modes are zero. InputError: the space has another number
+  /// of vertices.
   HighOrderMesh(ElementSpace space, const VolumeMesh& mesh);
 
-  /// x(u), or dx/du (columns are derivatives with respect to u, v, w), at a point of a cell in canonical coordinates.
-  /// Slow: every call makes its tables anew; for many points use `point_map` or ShapeFunctions.
+  /// Return x(u), or dx/du (columns are derivatives with respect to u, v, w), at a point of a cell in canonical
+  /// coordinates. Slow: every call makes its tables anew; for many points use `point_map` or ShapeFunctions.
   Vec3 position(std::size_t c, const Vec3& point) const;
   Mat3 jacobian(std::size_t c, const Vec3& point) const;
 
-  /// The same mesh in a space of other orders: it keeps its shape if no order falls, otherwise modes are dropped.
+  /// Returns the same mesh in a space of other orders: it keeps its shape if no order falls, otherwise modes are
+  /// dropped.
   HighOrderMesh with_orders(const EntityOrders& orders) const;
-  /// The linear cells on the same vertices.
+  /// Returns the linear cells on the same vertices.
   VolumeMesh straight_sided() const;
 };
 
@@ -49,7 +50,8 @@ struct CellPoint {
 /// its cell.
 void require_inside(const char* function, const ElementSpace& space, std::span<const CellPoint> points);
 
-/// Map from nodes to positions at points, one row per point. Weights within rounding of zero (1e-15) are left out.
+/// Returns the map from nodes to positions at points, one row per point. Weights within rounding of zero (1e-15) are
+/// left out.
 ///
 /// InputError: as `require_inside`. Parallel. For many products: `PointTables`.
 SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points);

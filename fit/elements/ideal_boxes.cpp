@@ -13,7 +13,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kMaxSweeps = 200;
+constexpr int kMaxSweeps = 200;  // sweeps end earlier if no log(size) changes by more than kSmallChange
 constexpr double kSmallChange = 1e-3;
 
 /// Logarithm of the mean length of a face's edges.
@@ -45,7 +45,7 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
 
 std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
                               double own_share) {
-  constexpr double kLeastShare = 1e-3;
+  constexpr double kLeastShare = 1e-3;  // of the common length: a collapsed edge must not make a box flat
   double ideal_volumes = 0;
   for (CellKind kind : mesh.kinds) ideal_volumes += ideal_volume(kind);
   const double common = std::cbrt(volume / std::max(ideal_volumes, std::numeric_limits<double>::min()));

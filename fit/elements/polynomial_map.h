@@ -48,7 +48,7 @@ PolynomialMap polynomial_map(const HighOrderMesh& mesh, const OrderLimits& limit
 /// threads.
 double sampled_distance(const HighOrderMesh& x, const HighOrderMesh& y, int samples_per_direction);
 
-/// Diagonal of the bounding box of the vertices: the length that relative distances between maps refer to.
+/// Returns the diagonal of the bounding box of the vertices: the length that relative distances between maps refer to.
 double vertex_diagonal(const HighOrderMesh& mesh);
 
 }  // namespace subvol

@@ -36,6 +36,8 @@ Quadrature make_triangle_quadrature(QuadratureRule rule, int n);
 
 /// Points per direction for an order >= 1: 2, 3, 5, 7, .. = 2p - 1, but 2 for order 1 (paper: section 3.2).
 int points_for_order(int order);
+/// Least number of points per direction for a distortion of curved cells: as many as on level 1 of subdivision volumes.
+inline constexpr int kLeastDistortionPoints = 5;
 /// The smallest 2^k + 1 (or 2) not below that: 2, 3, 5, 9, 9, 17, .. so that grids of all orders are nested.
 int nested_points_for_order(int order);
 

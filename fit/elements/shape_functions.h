@@ -12,7 +12,7 @@
 
 namespace subvol {
 
-/// Canonical coordinates of a cell's vertices (`cell_topology.h`).
+/// Returns the canonical coordinates of a cell's vertices (`cell_topology.h`).
 std::span<const Vec3> canonical_vertices(CellKind kind);
 
 /// One shape function of a cell, as a product of functions of one variable.
@@ -48,6 +48,7 @@ struct SignedMode {
 
 /// The entities of a cell that carry modes, by shape.
 enum class EntityShape : std::uint8_t { edge, triangle, quad, tet, prism, hex, pyramid };
+/// Returns the shape of a cell.
 EntityShape entity_shape(CellKind kind);
 
 /// Indices (i, j, k) of an entity's mode, from 1 on; those that the entity does not have are 0. With n = order - 1:
@@ -59,21 +60,22 @@ struct ModeIndex {
   int i, j, k;
 };
 
-/// Number of modes of an entity: n, n(n-1)/2, n^2, n(n-1)(n-2)/6, n^2(n-1)/2, n^3, 0 in the order of EntityShape.
+/// Returns the number of modes of an entity: n, n(n-1)/2, n^2, n(n-1)(n-2)/6, n^2(n-1)/2, n^3, 0 in the order of
+/// EntityShape.
 int num_modes(EntityShape shape, int order);
 
 /// Calls f(ModeIndex) for every mode, i fastest, then j, then k: the order in which nodes are numbered.
 template <class Function>
 void for_each_mode(EntityShape shape, int order, const Function& f);
 
-/// The shape function of a local vertex.
+/// Returns the shape function of a local vertex.
 LocalMode vertex_mode(CellKind kind, int vertex);
-/// Modes phi_i of the edge from local vertex a to b, phi_i phi_j of the quad with origin a, i running to b and j to d,
-/// and E_ab,i V_c,j of the triangle a b c.
+/// Return the mode phi_i of the edge from local vertex a to b, phi_i phi_j of the quad with origin a, i running to b
+/// and j to d, and E_ab,i V_c,j of the triangle a b c.
 SignedMode edge_mode(CellKind kind, int a, int b, int i);
 SignedMode quad_mode(CellKind kind, int a, int b, int d, int i, int j);
 SignedMode triangle_mode(CellKind kind, int a, int b, int c, int i, int j);
-/// A mode of the cell itself: hex phi_i phi_j phi_k, prism E_01,i V_2,j phi_k, tet E_01,i V_2,j V_3,k.
+/// Returns a mode of the cell itself: hex phi_i phi_j phi_k, prism E_01,i V_2,j phi_k, tet E_01,i V_2,j V_3,k.
 LocalMode cell_mode(CellKind kind, ModeIndex index);
 
 /// Values and gradients of shape functions at points of one kind of cell. Never allocates; use one object per thread.

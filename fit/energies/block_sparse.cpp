@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/base/sort_unique.h"
 
 #include <omp.h>
 
@@ -68,8 +69,7 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
       for (std::size_t k = first[i]; k < first[i + 1]; ++k)
         row.insert(row.end(), nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k]]),
                    nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k] + 1]));
-      std::sort(row.begin(), row.end());
-      row.erase(std::unique(row.begin(), row.end()), row.end());
+      sort_unique(row);
       slices[s].insert(slices[s].end(), row.begin(), row.end());
       result.offsets[i + 1] = row.size();
     }

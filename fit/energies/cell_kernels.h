@@ -118,7 +118,7 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
 
 /// Evaluates one of the distortions at kAtOnce points.
 struct DistortionKernel {
-  static constexpr int kAtOnce = 2;
+  static constexpr int kAtOnce = 2;  // points; the rotation of one need not wait for that of the other
   using Batch = DistortionBatch;
   Batch batches[kAtOnce];
   const DistortionKernels& kernels;
@@ -139,7 +139,7 @@ struct DistortionKernel {
 
 /// Evaluates the regularized barrier at one point.
 struct RegularizedKernel {
-  static constexpr int kAtOnce = 1;
+  static constexpr int kAtOnce = 1;  // point; only untangling uses it, which takes little time
   using Batch = RegularizedBatch;
   Batch batches[kAtOnce];
   double epsilon;

@@ -24,7 +24,7 @@ std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, c
   return {1 - second - third, second, third};
 }
 
-constexpr std::size_t kMostPoints = 6;
+constexpr std::size_t kMostPoints = 6;  // of a triangle
 
 /// Distance, as a share of the target's length, below which rounding makes the direction between two points arbitrary.
 constexpr double kLeastOffset = 1e-6;

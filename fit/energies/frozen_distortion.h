@@ -35,7 +35,7 @@ template <bool kCoupled>
 
 /// Stores a point's numbers in single precision, clamped to the range that it can hold.
 inline void keep_frozen(const Wide* frozen, int size, Narrow* kept) {
-  constexpr double kMost = 1e30;
+  constexpr double kMost = 1e30;  // single precision ends at 3e38; sums of many such numbers stay below that
   for (int k = 0; k < size; ++k) {
     Wide x = frozen[k];
     take_lower(x, Wide{} + kMost);

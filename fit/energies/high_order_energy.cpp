@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_sweep.h"
@@ -84,8 +85,7 @@ void HighOrderEnergy::rebuild_groups() {
     group.points_per_direction = key[2];
     if (group.kind != CellKind::hex) {
       for (Index c : cells) group.modes.insert(group.modes.end(), space.modes(c).begin(), space.modes(c).end());
-      std::sort(group.modes.begin(), group.modes.end());
-      group.modes.erase(std::unique(group.modes.begin(), group.modes.end()), group.modes.end());
+      sort_unique(group.modes);
     }
     group.make_tables(space.basis(), rule_);
     group.local_begin = local_size;
@@ -224,7 +224,7 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel& kernel,
                                        const PerPoint& per_point) const {
-  constexpr int kAtOnce = 2;
+  constexpr int kAtOnce = 2;  // points; the rotation of one need not wait for that of the other
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     const double hinge = hinge_weight_at(group);
@@ -430,7 +430,7 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
 
 /// Makes a point of one lane ten times as stiff: both its frozen numbers and their part of `mean_blocks`.
 void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane) {
-  constexpr double kStiffer = 10;
+  constexpr double kStiffer = 10;  // the factor; docs/fitting.md, "Steps"
   const int size = frozen_size(kernels_->coupled);
   Wide more[kMostFrozen];
   scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffer, more);
@@ -510,7 +510,7 @@ void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasi
 /// Weighs the points by the weights of their cells and, with an emphasis, by the shape of the cells at these nodes; the
 /// mean of all weights is 1.
 void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
-  constexpr double kFairShape = 0.6;
+  constexpr double kFairShape = 0.6;  // scaled Jacobian from which on a point gets no emphasis
   for (CellGroup& group : groups_) group.point_weights.clear();
   if (!has_emphasis() && cell_weights_.empty()) return;
   std::vector<std::vector<Wide>> weights;
@@ -544,7 +544,7 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
 
 void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3> nodes) {
   constexpr int kMostPoints = 25;  // more points cost more than they gain (measured)
-  constexpr double kFirstEmphasis = 4;
+  constexpr double kFirstEmphasis = 4;  // then doubled with each refinement
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
       throw InputError("HighOrderEnergy: there is no cell " + std::to_string(c));

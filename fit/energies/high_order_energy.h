@@ -25,7 +25,7 @@ struct CellGroup;
 /// (edge length 1, stretched by h_c along its three coordinates) or a given reference. Nodes are those of an
 /// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. w_cq is the quadrature weight.
 ///
-/// E_W is a mean, and e grows slowly towards inversion: a few places that are much worse than necessary hardly change
+/// E_W is a mean, and e grows slowly toward inversion: a few places that are much worse than necessary hardly change
 /// it. With an emphasis k > 0 points of poor shape weigh more, while the mean of all weights stays the same:
 ///
 ///   w_cq ~ w_q (1 + k_c max(0, 1 - s_cq / 0.6)^2),   s_cq = det J / (|J e1| |J e2| |J e3|) (at least 0)
@@ -88,7 +88,7 @@ class HighOrderEnergy final : public RegularizedTerm {
   /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  static constexpr double kMostEmphasis = 1024;
+  static constexpr double kMostEmphasis = 1024;  // largest k allowed; lifts end at 512 (`kEmphases`)
   /// Sets k and weighs points by their shapes at these nodes. InputError: k is not in [0, kMostEmphasis].
   void emphasize_poor(std::span<const Vec3> nodes, double emphasis);
   /// Sets w_h and t. InputError: a weight that is negative or not finite, a threshold above 1.

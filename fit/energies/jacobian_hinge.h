@@ -17,7 +17,7 @@ struct JacobianHinge {
 
   /// f  nine entries, row by row.
   [[gnu::always_inline]] JacobianHinge(const Wide* f, double threshold) {
-    constexpr double kTiny = 1e-300;
+    constexpr double kTiny = 1e-300;  // squared length, so that no column is divided by zero
     Wide unit[9], length_squared[3];  // unit: columns divided by their lengths
     for (int c = 0; c < 3; ++c) {
       length_squared[c] = f[c] * f[c] + f[3 + c] * f[3 + c] + f[6 + c] * f[6 + c];

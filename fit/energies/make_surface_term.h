@@ -26,8 +26,8 @@ struct SurfaceGroups {
 /// pull        direction of the correspondences of `ClosestPointEnergy`
 /// far_length  argument of `ClosestPointEnergy::emphasize_far`; 0: not called
 /// refined     argument of `ClosestPointEnergy::refine`; empty: not called
-/// groups      only parts of the same group correspond. InputError: groups with Correspondence::voronoi, whose cells know
-///             none.
+/// groups      only parts of the same group correspond. InputError: groups with Correspondence::voronoi, whose cells
+///             know none.
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,

@@ -18,7 +18,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kPoints = 3, kDensePoints = 5;
+constexpr int kPoints = 3, kDensePoints = 5;  // per direction, the corners among them; dense after `densify`
 constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
 // The energy uses a larger share, which bounds its derivatives. A folded cell had a direction of length 1e-7 at a
@@ -29,6 +29,8 @@ constexpr double kBelowCap = 0.02;         // goals at caps are lower than the c
 constexpr double kLeastGoal = 0.01;        // but not below this: caps are 0 where edges are flat
 constexpr double kLeastShare = -1;         // of a goal; no inverted cell is worse than another one
 constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
+/// Factors on the emphasis of a cell that is below its goal, or above it, and the largest emphasis. It rises within a
+/// few rounds and falls slowly, so that a cell which has just reached its goal stays there.
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
 
 constexpr double kSamePlace = 1e-12;  // in canonical coordinates
@@ -491,6 +493,8 @@ std::vector<Index> QualityEnergy::uncertified(std::span<const Vec3> nodes) const
 }
 
 std::vector<Index> QualityEnergy::ruined(std::span<const Vec3> before, std::span<const Vec3> after) const {
+  // Scaled Jacobian from which on no loss matters. Below it, a cell must keep half of what it had, and an inverted cell
+  // may lose this much.
   constexpr double kAcceptable = 0.05, kKeptShare = 0.5, kMostLoss = 0.02;
   std::vector<std::uint8_t> is_ruined(mesh_->num_cells());
 #pragma omp parallel for schedule(static)

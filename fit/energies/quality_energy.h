@@ -84,7 +84,7 @@ class QualityEnergy final : public VolumeTerm {
     std::vector<double> shares{};  ///< least share of each of these
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
-  /// below; elsewhere it falls back by 3 % towards 1. At most 1000. The goal at a cap is lower than the cap by 0.02,
+  /// below; elsewhere it falls back by 3 % toward 1. At most 1000. The goal at a cap is lower than the cap by 0.02,
   /// but at least 0.01; shares of it count as -1 or more. If folds are forbidden, a fold reaches its goal halfway
   /// between its limit and 360 degrees, and a corner also needs edges of the least length.
   State emphasize_poor(std::span<const Vec3> nodes, double goal);

@@ -14,6 +14,7 @@ namespace subvol::internal {
 
 namespace {
 
+/// Weights of the terms of shape and of size.
 constexpr double kShapeWeight = 0.25, kSizeWeight = 1.0 / 6;
 
 /// (D + sqrt(eps^2 + D^2)) / 2 without cancellation.
@@ -42,7 +43,7 @@ SignedSingularValues signed_values(const Singular& singular, int lane) {
   for (int i = 0; i < 2; ++i) result.v.col(i) = v.col(order[i]);
   result.v.col(2) = result.v.col(0).cross(result.v.col(1));
   const Vec3 first = jv.col(order[0]), second = jv.col(order[1]);
-  constexpr double kNone = 1e-140;
+  constexpr double kNone = 1e-140;  // singular values below it are 0: their squares vanish in double precision
   result.s[0] = first.norm();
   result.u.col(0) = result.s[0] > kNone ? Vec3(first / result.s[0]) : Vec3(Vec3::UnitX());
   const Vec3 across = second - result.u.col(0).dot(second) * result.u.col(0);
@@ -65,7 +66,7 @@ RegularizedBatch evaluated(DistortionBatch& batch, double epsilon) {
 }
 
 void fill_second(const RegularizedBatch& barrier, DistortionBatch& batch) {
-  constexpr double kLeastSquare = 1e-200;
+  constexpr double kLeastSquare = 1e-200;  // of |J|^2; a smaller J is replaced by a tiny multiple of the identity
   Wide j[9];
   for (int k = 0; k < 9; ++k) j[k] = load_wide(batch.jacobian[k]);
   Wide square{};

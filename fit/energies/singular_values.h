@@ -62,7 +62,7 @@ struct Symmetric {
 /// det C / 2. With the sign of p that makes r >= 0 the first of them differs from the others by at least sqrt 3, so
 /// that its eigenvector is well-conditioned, and the adjugate of C - 2 cos t I is v v^T times 6 to 9.
 [[gnu::always_inline]] inline void isolated_eigenvector(const Symmetric& a, Wide* vector) {
-  constexpr double kLeast = 1e-60;
+  constexpr double kLeast = 1e-60;  // of |A - q I|^2, so that nothing is divided by zero
   Symmetric m = a;
   const Wide mean = (1.0 / 3) * (a.diagonal[0] + a.diagonal[1] + a.diagonal[2]);
   Wide square = Wide{}, mixed = Wide{};

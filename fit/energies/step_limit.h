@@ -51,6 +51,7 @@ class StepLimit {
       return c0 + a1 / 3 > 0 && c0 + 2 * a1 / 3 + a2 / 3 > 0 && c0 + a1 + a2 + a3 > 0;
     }
   };
+  // Ratio of successive steps, and the share of a determinant that a step must leave.
   static constexpr double kShrink = 0.8, kKept = 0.1;
   static constexpr int kMaxSteps = 200;
   std::array<double, kMaxSteps + 1> step_;  // a table, so that all threads use the same bits of a step

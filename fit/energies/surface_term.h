@@ -103,7 +103,7 @@ class SurfaceTerm {
 /// Returns the sum of f(i) over [0, n), in slices of fixed size: the same bits for any number of threads.
 template <class Function>
 double sliced_sum(std::size_t n, const Function& f) {
-  constexpr std::size_t kSlice = 1024;
+  constexpr std::size_t kSlice = 1024;  // large enough that starting a thread's slice costs nothing
   std::vector<double> sums((n + kSlice - 1) / kSlice, 0.0);
 #pragma omp parallel for schedule(static)
   for (std::size_t s = 0; s < sums.size(); ++s)

@@ -48,7 +48,7 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int 
 }
 
 void VolumeEnergy::densify(std::span<const Index> cells, std::span<const Vec3>) {
-  constexpr int kDensePoints = 5;
+  constexpr int kDensePoints = 5;  // per direction, as on level 1
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
       throw InputError("VolumeEnergy: there is no cell " + std::to_string(c));

@@ -2,6 +2,7 @@
 #include "subvol/fit/features/crease_distance.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/fit/geometry/closest_point.h"
 
 #include <cmath>
@@ -9,6 +10,8 @@
 #include <string>
 
 namespace subvol {
+
+using namespace internal;
 
 namespace {
 

@@ -36,9 +36,10 @@ inline constexpr double kSharpPercent = 0.1;
 /// Measures these distances with samples at most a thousandth of the diagonal apart on both sides.
 ///
 /// points    ends of the segments: finite positions. Points and curves that segments name must exist, else InputError.
-/// diagonal  100 percent, > 0, else InputError. Deterministic. Cost: about 1 us a sample.
+/// diagonal  100 percent, > 0, else InputError.
 /// followed  if not null, the curves that segments name: those above, each as far as it can be followed, and more parts
 ///           of them after that. Distances and lengths of followed curves are those of these.
+/// Deterministic. Cost: about 1 us a sample.
 CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3> points,
                                std::span<const CreaseSegment> segments, double diagonal,
                                const FeatureCurves* followed = nullptr);

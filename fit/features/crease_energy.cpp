@@ -2,6 +2,7 @@
 #include "subvol/fit/features/crease_energy.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
 
 #include <algorithm>
 #include <map>

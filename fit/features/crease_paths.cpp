@@ -204,7 +204,7 @@ class PathFinder {
 
   /// Returns the vertices nearest to the middle half of the curve: enough that one is left if any two are excluded.
   std::vector<MiddlePlace> middle_places(std::span<const Vec3> points) const {
-    constexpr std::size_t kEnough = 3;
+    constexpr std::size_t kEnough = 3;  // one more than can be excluded
     std::vector<double> along = {0};
     for (std::size_t i = 1; i < points.size(); ++i) along.push_back(along.back() + (points[i] - points[i - 1]).norm());
     const ClosestPoint tree = polyline_tree(points);

@@ -62,7 +62,7 @@ class Bends {
   }
 
   bool is_crisp(Index v, Index w) const {
-    constexpr double kMostShare = 1.0 / 3;
+    constexpr double kMostShare = 1.0 / 3;  // of the edge's angle: the edges around it must bend less than that
     const Index edge = find(v, w);
     if (edge == kNoIndex) return false;
     double others = 0;

@@ -11,8 +11,8 @@ namespace subvol::internal {
 
 /// How much the sharp edges of a surface stand out from what is around them.
 struct EdgeCrispness {
-  /// Share of the curves' length along which no other edge of the two triangles bends by more than a third of the edge's
-  /// own angle; edges that belong to curves do not count as others. 0 without curves.
+  /// Share of the curves' length along which no other edge of the two triangles bends by more than a third of the
+  /// edge's own angle; edges that belong to curves do not count as others. 0 without curves.
   double crisp_share = 0;
   /// Length of the curves that are crisp along most of their length and longer than 3 % of the diagonal of their
   /// connected part, divided by the square root of the surface's area.
@@ -29,6 +29,7 @@ struct EdgeCrispness {
   /// length of less than 1, or at most 0.95 in the first sum, but for two coarse meshes of animals, and at most 1.24 in
   /// the second one. The parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
+    // Relative length that counts as much as a crisp share of 1, and the factor on the planar share.
     constexpr double kLong = 15, kOfPlanes = 2;
     constexpr double kLeastLength = 0.3;  // more than the rim of a hole that was covered in a scan
     const double crisp = crisp_share + relative_length / kLong;

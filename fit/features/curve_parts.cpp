@@ -26,7 +26,7 @@ double length_of(const Interval& interval) { return interval.second - interval.f
 /// it evenly; ascending.
 std::vector<double> places_in(const Interval& all, double h) {
   constexpr std::array kNearEnds = {1.0, 2.0, 3.0, 4.5, 6.0};
-  constexpr int kDivisions = 8;
+  constexpr int kDivisions = 8;  // equal parts of the interval
   std::vector<double> places = {all.first, all.second};
   for (const double near : kNearEnds)
     if (near * h < length_of(all)) places.insert(places.end(), {all.first + near * h, all.second - near * h});
@@ -90,7 +90,7 @@ class PartSearch {
 
   /// Finds the longest part of a closed curve, if one is long enough. Returns what is left.
   Interval cut_open() {
-    constexpr int kPlaces = 8;
+    constexpr int kPlaces = 8;  // starts that are tried, evenly spread along the curve
     const double length = curve_.length();
     std::vector<Interval> parts;
     for (int k = 0; k < kPlaces; ++k) {

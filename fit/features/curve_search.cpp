@@ -111,7 +111,7 @@ CurveSearch::Course CurveSearch::course_by_middle(Index c) const {
 
 /// Around a closed curve in three legs, from its corner or its point nearest to a vertex.
 CurveSearch::Course CurveSearch::round_course(Index c) const {
-  constexpr int kLegs = 3;
+  constexpr int kLegs = 3;  // the fewest that go around: two could be the same path, there and back
   const FeatureCurve& curve = curves_[c];
   const Index corner = curve.vertices.front(),
               fixed = features_.curves.is_corner(corner) ? corners_.vertex_of(corner) : kNoIndex;

@@ -3,6 +3,8 @@
 
 #include "subvol/base/angle.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
@@ -160,8 +162,7 @@ FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                        std::to_string(b) + " of " + std::to_string(mesh.positions.size()));
     sharp.push_back({std::min(a, b), std::max(a, b)});
   }
-  std::sort(sharp.begin(), sharp.end());
-  sharp.erase(std::unique(sharp.begin(), sharp.end()), sharp.end());
+  sort_unique(sharp);
   return EdgeWalk(mesh, sharp, angle_degrees).curves();
 }
 

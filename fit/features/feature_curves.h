@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/fit/features/polyline.h"
+#include "subvol/base/types.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>

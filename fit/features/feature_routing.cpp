@@ -28,6 +28,7 @@ constexpr double kJoinDistance = 2.2;
 constexpr double kJoinPenalty = 0.3;
 /// Number of edges along another path, from their corner, within which a path may join it; no farther than its middle.
 constexpr std::size_t kJoinEdges = 3;
+/// Largest number of rounds in which corners and paths are chosen again, each from the other.
 constexpr int kRounds = 8;
 /// Cost of a corner's vertex on the path of another curve, for corners that give way.
 constexpr double kOnWayPenalty = 1;

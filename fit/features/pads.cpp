@@ -22,7 +22,7 @@ namespace {
 constexpr double kDepth = 0.2;
 /// Cosine above which two faces count as one plane: those of a grid are along its axes.
 constexpr double kSameNormal = 0.9;
-constexpr int kShortenings = 20;
+constexpr int kShortenings = 20;  // halvings of a step: 1e-6 of it is none
 
 using CellFaces = std::array<Index, kMaxCellFaces>;  ///< something for each local face of a cell
 

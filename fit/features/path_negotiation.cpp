@@ -14,6 +14,7 @@ namespace {
 /// In units of h^3, an edge on its curve costs about 0.02, and one that is h off costs 1. The first price of another
 /// path makes no detour; that of the last round, 44, makes every detour within reach. Not tuned.
 constexpr int kMostRounds = 20;
+/// The price grows by this factor from round to round. A place where several paths met costs this much more per round.
 constexpr double kFirstPrice = 0.02, kGrowth = 1.5, kPriceOfHistory = 0.1;
 
 /// Number of paths at each vertex or edge, and the number of rounds that ended with several there.

@@ -2,6 +2,7 @@
 #include "subvol/fit/features/path_sides.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -41,8 +42,7 @@ std::vector<std::vector<Index>> path_sides(const RoutingGraph& graph, std::span<
   for (const Vec3& point : points)
     for (const Index v : graph.vertices_near(point, reach))
       if (!occupied.vertices[v]) near.push_back(v);
-  std::ranges::sort(near);
-  near.erase(std::unique(near.begin(), near.end()), near.end());
+  sort_unique(near);
   std::vector<std::vector<Index>> neighbors(near.size());  // places in `near`
   for (std::size_t i = 0; i < near.size(); ++i)
     for (const Index e : graph.edges_at(near[i])) {

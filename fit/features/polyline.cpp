@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 double polyline_length(std::span<const Vec3> points) {
   double length = 0;
@@ -64,4 +64,4 @@ std::size_t ArcLength::segment(double place) const {
   return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above - 1, 0, std::ssize(along_) - 2));
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

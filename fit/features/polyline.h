@@ -7,10 +7,9 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
-/// Functions of polylines: at least two points in all of them.
-
+/// Returns the length of a polyline. All functions expect polylines of at least two points.
 double polyline_length(std::span<const Vec3> points);
 
 /// Returns a tree over the segments of a polyline, numbered in its order. points: finite.
@@ -40,4 +39,4 @@ class ArcLength {
   std::vector<double> along_;  ///< arc length up to each point
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 

@@ -63,7 +63,7 @@ std::size_t divide(const MeshTopology& topology, const SheetFaces& sheets, std::
 }  // namespace
 
 SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angle_degrees) {
-  constexpr double kNone = 180, kSharp = 90, kFlat = 180;
+  constexpr double kNone = 180, kSharp = 90, kFlat = 180;  // degrees; no bend is above kNone
   SheetCurves result;
   const std::vector<std::array<Index, 2>> junctions = curve_edges(target);
   SignedFeatures& features = result.features;

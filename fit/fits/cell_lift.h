@@ -16,7 +16,7 @@ struct LiftValues {
 };
 /// Emphasis on places of poor shape, and weight of the hinge (`HighOrderEnergy`).
 inline constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
-inline constexpr int kLiftSteps = 8;
+inline constexpr int kLiftSteps = 8;  ///< of the minimization with one value
 /// The threshold of the hinge is the quality aimed at plus this. At order 4, a bone of 87 hexes came to a least scaled
 /// Jacobian of 0.66 with 0.05, and to 0.76 with 0.2; a double torus gained nothing with 0.35.
 inline constexpr double kHingeAboveQuality = 0.2;
@@ -41,7 +41,7 @@ enum class Again { kept, undone, ended };
 /// returns           `ended`, or else `kept`.
 template <class IsPoor, class RunAgain>
 Again lift(double setting, const LiftValues& values, const IsPoor& is_poor, const RunAgain& run_again) {
-  constexpr int kMostFailedLifts = 3;
+  constexpr int kMostFailedLifts = 3;  // in a row; the next value may still help after one or two that do not
   double attempted = setting;
   for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < values.last;) {
     attempted = attempted == 0 ? values.first : values.factor * attempted;

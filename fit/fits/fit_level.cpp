@@ -138,8 +138,8 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
 }
 
 int limit_refinements(const VolumeMesh& mesh) {
-  constexpr int kMost = 2;
-  constexpr std::size_t kMostTriangles = 200000;
+  constexpr int kMost = 2;                        // refinements of each face
+  constexpr std::size_t kMostTriangles = 200000;  // beyond it, one refinement less, to bound the time of distances
   const std::size_t of_two = MeshTopology(mesh).boundary_faces().size() * 2 << 2 * kMost;
   return of_two > kMostTriangles ? kMost - 1 : kMost;
 }

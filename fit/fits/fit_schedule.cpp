@@ -17,7 +17,7 @@ constexpr double kHeldLambda = 0.01;
 /// Stages that take many steps solve their systems roughly and keep the cells' Hessian, which makes a step cheaper. A
 /// continuation does neither: its few steps must free every cell.
 constexpr double kRoughTolerance = 0.3;
-constexpr int kHessianLife = 4;
+constexpr int kHessianLife = 4;  // steps
 /// Accelerated steps decrease E by more, so these stages end at larger decreases than others: E is then what it is at
 /// the end of many more plain steps.
 constexpr double kAcceleratedDecrease = 5e-3;

@@ -8,7 +8,7 @@
 
 namespace subvol::internal {
 
-/// A fit without a tolerance lowers lambda further until the mean distance is below this, in per cent of the diagonal.
+/// A fit without a tolerance lowers lambda further until the mean distance is below this, in percent of the diagonal.
 inline constexpr double kDefaultAccuracyPercent = 0.015;
 /// Least lambda, as a share of `FitOptions::lambda_close`, without and with a tolerance.
 inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;

@@ -119,7 +119,7 @@ bool put_back(VolumeMesh& mesh, std::span<const Vec3> before, const QualityRepor
 std::size_t flatten(VolumeMesh& mesh, const MeshTopology& topology, std::span<const Index> group,
                     const Closest& closest, const FlatFacets& facets, double tolerance, double least_jacobian) {
   constexpr double kLongest = 0.1;  // of the shortest edge
-  constexpr int kMostRounds = 20;
+  constexpr int kMostRounds = 20;   // each puts more vertices back; then all are
   const std::vector<std::vector<Index>> wanted = facets_of_vertices(mesh, topology, group, closest, facets);
   const std::vector<double> shortest = shortest_edges(mesh, topology);
   const std::vector<Vec3> before = mesh.positions;

@@ -20,27 +20,27 @@ namespace subvol::internal {
 ///
 ///   min |d|  subject to  n_i . (x + d) = c_i
 ///
-/// Vertices stay where they are if no such vector exists, or if it is longer than a tenth of their shortest edge. Where a
-/// cell would lose its certificate, or become poorer than the poorest cell of the mesh was, the vertices of that cell
+/// Vertices stay where they are if no such vector exists, or if it is longer than a tenth of their shortest edge. Where
+/// a cell would lose its certificate, or become poorer than the poorest cell of the mesh was, the vertices of that cell
 /// stay, too.
 ///
-/// mesh    passes `validate` except for unused vertices and inverted cells; its boundary lies close to the target. If it
-///         is a cage, the subdivision surface becomes flat where its control vertices are.
+/// mesh    passes `validate` except for unused vertices and inverted cells; its boundary lies close to the target. If
+///         it is a cage, the subdivision surface becomes flat where its control vertices are.
 /// target  oriented outward or inward as a whole; tree and facets: its own.
 /// returns the number of vertices that lie on planes afterwards. Same bits for any number of threads.
 /// Cost: five closest points for each boundary face, and the quality of the mesh some times.
 std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
                           const FlatFacets& facets);
 
-/// Does the same for the boundary and for the interfaces between regions: vertices that lie in both satisfy the planes of
-/// both. With interfaces, a cell may become as poor as `least_jacobian`, even if no cell of the mesh was before.
+/// Does the same for the boundary and for the interfaces between regions: vertices that lie in both satisfy the planes
+/// of both. With interfaces, a cell may become as poor as `least_jacobian`, even if no cell of the mesh was before.
 ///
 /// target  with the interfaces that the mesh is to keep; the mesh is in its coordinates.
 std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian);
 
 /// Moves the control vertices of flat interfaces into their planes, so that their subdivision surfaces are flat, up to
-/// rounding: those of each patch of interface faces between creases and feature curves that lies on one flat facet of the
-/// target's interfaces. A vertex of several patches moves as in `flatten_faces`.
+/// rounding: those of each patch of interface faces between creases and feature curves that lies on one flat facet of
+/// the target's interfaces. A vertex of several patches moves as in `flatten_faces`.
 ///
 /// cage  a control mesh, in the target's coordinates. Its cells are not looked at: the caller must.
 /// returns the number of vertices that were moved. Cost: five closest points for each interface face.

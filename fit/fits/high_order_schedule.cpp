@@ -7,8 +7,9 @@ namespace subvol::internal {
 
 namespace {
 
+/// Lambda of a stiff approach: 20 times that of other stages.
 constexpr double kStiffLambda = 1;
-constexpr int kMaxIterations = 40;
+constexpr int kMaxIterations = 40;  // steps of a stage; most end earlier
 /// Stiff stages only lead the way: after this many steps, the next stage makes faster progress.
 constexpr int kStiffIterations = 10;
 /// Order from which on a stiff approach lowers lambda.

@@ -38,7 +38,7 @@ struct HighOrderSchedule {
 };
 
 /// For a far template, another attempt is made at the first orders if the boundary is folded, or if the mean distance,
-/// in per cent of the diagonal, exceeds kFairDistancePercent and E_W exceeds kFairDistortion: the cells are distorted
+/// in percent of the diagonal, exceeds kFairDistancePercent and E_W exceeds kFairDistortion: the cells are distorted
 /// and still far from the target, so their resolution is not the cause.
 inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
 /// Below this order, the distance does not show if an approach went wrong.

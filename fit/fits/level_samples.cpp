@@ -10,7 +10,7 @@
 namespace subvol::internal {
 
 LevelSamples samples_of(const VolumeMesh& mesh) {
-  constexpr int kIntervals = 2;
+  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), kIntervals, mesh.tags.creases);
   return {std::move(samples.positions), std::move(samples.triangles), std::move(samples.triangle_faces),

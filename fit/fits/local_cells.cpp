@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/templates/refine.h"
@@ -38,8 +39,7 @@ std::size_t choose(std::span<const Fault> faults, double most, std::vector<char>
 }
 
 std::vector<Index> ascending(std::vector<Index> cells) {
-  std::ranges::sort(cells);
-  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  sort_unique(cells);
   return cells;
 }
 

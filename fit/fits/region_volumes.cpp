@@ -52,7 +52,7 @@ struct FaceGradients {
 };
 
 FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
-  constexpr double kRounding = 1e-9;
+  constexpr double kRounding = 1e-9;  // share of the face's radius up to which it is flat
   // The volume below a fan around the mean of the corners, as `region_volumes` measures it.
   FaceGradients result;
   result.of_corner.fill(Vec3::Zero());
@@ -79,6 +79,7 @@ FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
 
 /// Takes a direction out of those in which a vertex may move.
 void forbid(Mat3& projector, const Vec3& normal) {
+  // Sine of 3 degrees: normals closer than that to those forbidden before are not independent of them.
   constexpr double kIndependent = 0.05;
   const Vec3 left = projector * normal;
   if (left.norm() < kIndependent) return;
@@ -150,7 +151,7 @@ bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> fac
 }  // namespace
 
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kRounds = 6;
+  constexpr int kRounds = 6;        // Newton steps at most; they end at kEnough
   constexpr double kEnough = 1e-6;  // relative
   const MeshTopology topology(mesh);
   const std::vector<SheetFace> faces = sheet_faces(mesh, topology);

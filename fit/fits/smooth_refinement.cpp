@@ -11,7 +11,8 @@
 namespace subvol::internal {
 
 VolumeMesh smooth_refinement(const VolumeMesh& mesh) {
-  constexpr double kLeastJacobian = 0.2;
+  constexpr double kLeastJacobian = 0.2;  // scaled Jacobian; a vertex of a worse cell stays closer to the plain split
+  // A vertex's share is halved in the first passes and is 0 from then on.
   constexpr int kHalvings = 6, kPasses = 10, kPointsPerDirection = 3;
   SubdivisionLevel level = subdivide(mesh);
   const std::vector<Vec3> split = linear_split(mesh).apply(mesh.positions);

@@ -31,7 +31,7 @@ class CellEnvelope {
   /// Adds eight functions, given by their values at the triangle's corners; kNever at all corners means no function.
   /// `ranks` decide between equal functions: the lowest comes first.
   void add(const std::array<Wide, 3>& values, const std::array<std::int32_t, kWide>& ranks);
-  static constexpr double kNever = 1e300;
+  static constexpr double kNever = 1e300;  // above every squared distance
 
   /// Finds the cells of a polygon.
   ///
@@ -43,6 +43,7 @@ class CellEnvelope {
   const std::vector<Cell>& cells() const { return cells_; }
 
  private:
+  // Polygons of more corners are left to the other method, which takes any number.
   static constexpr int kMaxCorners = 24, kMaxKnown = 7;
   struct Polygon {
     int size = 0;

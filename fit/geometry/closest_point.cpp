@@ -89,7 +89,7 @@ ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
 
 /// Orders the items like the tree's leaves: every cut is at the median along the longest axis.
 void ClosestPoint::partition(std::vector<Item>& items, Range range) {
-  constexpr Index kLeastTask = 4096;
+  constexpr Index kLeastTask = 4096;  // items; smaller tasks cost more than they save
   const Parts parts = parts_of(range, [&](Range lower, Range upper) {
     const auto first = items.begin() + lower.begin, last = items.begin() + upper.end;
     Vec3 low = Vec3::Constant(kInfinity), high = -low;

@@ -49,11 +49,11 @@ class ClosestPoint {
   void closest(std::span<const Vec3> points, std::span<Hit> hits) const;
 
   std::size_t num_triangles() const { return order_.size(); }
-  /// Triangles in the order of the tree's leaves: those close to each other in it are close in space.
+  /// Returns the triangles in the order of the tree's leaves: those close to each other in it are close in space.
   std::span<const Index> order() const { return order_; }
 
  private:
-  static constexpr int kWidth = 8;
+  static constexpr int kWidth = 8;  // children of a node: as many boxes as one vector instruction tests
 
   /// Boxes of the children, coordinate by coordinate, so that all of them are tested at once.
   struct Node {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/contact_imprint.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
@@ -354,8 +355,7 @@ bool ContactImprint::replace_clusters() {
     return false;
   }
   set_triangles(pieces);
-  std::ranges::sort(vertices_);
-  vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+  sort_unique(vertices_);
   return true;
 }
 

@@ -11,8 +11,8 @@ namespace subvol::internal {
 
 /// Finds closest points on those triangles of a mesh that belong to a group: one tree for each group, and one for all.
 ///
-/// Where a sharp edge is near, the closest point of the whole surface may lie on the wrong side of it; the closest point
-/// of the group does not.
+/// Where a sharp edge is near, the closest point of the whole surface may lie on the wrong side of it; the closest
+/// point of the group does not.
 class GroupedClosestPoint {
  public:
   /// groups  group of each triangle, from 0 on; empty: all in group 0. InputError: another number of groups than of

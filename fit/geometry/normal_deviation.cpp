@@ -19,7 +19,7 @@ using namespace internal;
 
 namespace {
 
-constexpr double kBinsPerDegree = 2;
+constexpr double kBinsPerDegree = 2;  // angles from 0 to 90 degrees
 constexpr std::size_t kBins = 180;
 
 /// Areas by angle.

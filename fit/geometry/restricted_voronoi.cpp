@@ -16,7 +16,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kChunk = 256;
+constexpr std::size_t kChunk = 256;  // triangles whose sums are made together; the same for any number of threads
 constexpr double kMaxLooseness = 2;  // of the tree's boxes; beyond it, the tree is built anew
 
 Vec3 box_center(std::span<const Vec3> points) {

@@ -145,7 +145,7 @@ class Search {
     some_.clear();
   }
 
-  static constexpr std::size_t kPairsAtATime = 1 << 18;
+  static constexpr std::size_t kPairsAtATime = 1 << 18;  // tested by all threads before the next are collected; 2 MB
   const PairTest& test_;
   const std::function<bool()>& cancelled_;
   SelfIntersections& result_;

@@ -50,7 +50,7 @@ template <class Keyed>
 int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::span<const Keyed> at_edge,
                    bool all_known, double spacing) {
   constexpr double kSmoothCosine = 0.985;  // of 10 degrees
-  constexpr double kMost = 1000;
+  constexpr double kMost = 1000;           // points of an edge, however long it is
   if (at_edge.size() == 1 && !all_known) return 1;
   const auto corners = [&](const Keyed& side) { return mesh.triangles[order[side.edge.place]]; };
   const auto normal = [&](const Keyed& side) { return triangle_normal(mesh, order[side.edge.place]); };
@@ -165,7 +165,7 @@ class Sampler {
 /// it.
 template <class Add>
 void sample(std::size_t n, const ClosestPoint& to, const Add& add, OneSided& result) {
-  constexpr std::size_t kRun = 128;
+  constexpr std::size_t kRun = 128;  // samples
   std::vector<OneSided> runs((n + kRun - 1) / kRun);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < runs.size(); ++run) {

@@ -11,6 +11,7 @@ namespace subvol {
 
 class ClosestPoint;
 
+/// Options of `surface_distance`.
 struct SurfaceDistanceOptions {
   int num_samples = 50000;  ///< approximate number of points of each mean, spread by area; >= 1
   /// Vertices and points on edges also count for the maxima. Without them, measuring takes about two thirds of the
@@ -30,7 +31,7 @@ struct SurfaceDistance {
   /// from b to a are set.
   bool one_sided = false;
 
-  /// Symmetric distances: the larger of the two one-sided ones, or the only one.
+  /// Return the symmetric distances: the larger of the two one-sided ones, or the only one.
   double mean() const { return std::max(mean_a_to_b, mean_b_to_a); }
   double max() const { return std::max(max_a_to_b.distance, max_b_to_a.distance); }
   const Extreme& extreme() const {
@@ -54,19 +55,20 @@ struct SurfaceDistance {
 SurfaceDistance surface_distance(const TriangleMesh& a, const TriangleMesh& b,
                                  const SurfaceDistanceOptions& options = {});
 
-/// As above with existing trees, for a target that is measured against many times.
+/// Does the same with existing trees, for a target that is measured against many times.
 SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree_a, const TriangleMesh& b,
                                  const ClosestPoint& tree_b, const SurfaceDistanceOptions& options = {});
 
-/// One-sided: the distances from points to a surface, all with the same weight.
+/// Measures the distances from points to a surface, all with the same weight; the result is one-sided.
 ///
 /// InputError: as `ClosestPoint`, or no points. Same bits for any number of threads.
 SurfaceDistance surface_distance(const TriangleMesh& a, const PointCloud& b);
 SurfaceDistance surface_distance(const ClosestPoint& tree_a, std::span<const Vec3> b);
 
-/// Diagonal of the bounding box of a surface's triangles, to which percentages of distances refer. 0 if empty.
+/// Returns the diagonal of the bounding box of a surface's triangles, to which percentages of distances refer; 0 if
+/// there are none.
 double bounding_box_diagonal(const TriangleMesh& mesh);
-/// Diagonal of the bounding box of the points. 0 if empty.
+/// Returns the diagonal of the bounding box of the points; 0 if there are none.
 double bounding_box_diagonal(const PointCloud& cloud);
 
 }  // namespace subvol

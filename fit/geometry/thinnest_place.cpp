@@ -14,7 +14,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kSamples = 20'000;
+constexpr std::size_t kSamples = 20'000;  // points of the surface from which balls grow
 constexpr int kMostParts = 6;         // an edge of a triangle is cut into at most so many parts
 /// A ball counts as empty if a smaller one is, by this factor. The center of the smaller one is not as far from many
 /// triangles as from the closest, as the center of a round solid is: the search stays short.
@@ -76,7 +76,7 @@ class Balls {
  private:
   /// Shrinks a ball until the surface is outside of `kSmaller` times it. Returns false if it never touches the surface.
   bool shrink(const Sample& sample, const Vec3& inward, double radius, ThinPlace& found) const {
-    constexpr int kSteps = 40;
+    constexpr int kSteps = 40;         // of kSmaller each: 1e-5 of the first radius
     constexpr double kTouches = 1e-7;  // share of the radius
     for (int step = 0; step < kSteps; ++step) {
       const double smaller = kSmaller * radius;

@@ -27,8 +27,8 @@ enum class ThinSide {
 ///
 /// From points of the triangles a ball is grown into that side until it touches the surface again, approximately a
 /// medial ball. The place counts if the normals of the two stretches are 120 degrees or more apart, if the line across
-/// is within 30 degrees of the normal, and if the two triangles have no vertex in common. So the sides of an edge are no
-/// wall, unless the edge is sharper than 60 degrees.
+/// is within 30 degrees of the normal, and if the two triangles have no vertex in common. So the sides of an edge are
+/// no wall, unless the edge is sharper than 60 degrees.
 ///
 /// mesh       normals point out of the solid; vertices are welded.
 /// tree       of the mesh.

@@ -15,7 +15,8 @@ constexpr std::array<double, 6> kWholeTriangle = {1. / 6, 1. / 12, 1. / 12, 1. /
 // Six products and sums with relative errors of 1.1e-16 each, and as much again for interpolated corners.
 constexpr double kRounding = 4e-15;
 
-// Largest number of sites for which the cells of a part are found at once, and of failures of that in a row.
+// Largest number of sites for which the cells of a part are found at once, and of failures of that in a row, after
+// which it is no longer tried.
 constexpr std::size_t kMaxCandidates = 160;
 constexpr int kMaxFailures = 16;
 // Rounding must not lose the site on the sphere of a ball.

@@ -285,7 +285,8 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
 }
 
 LocalMending LocalMender::run() {
-  constexpr int kMostRounds = 30;
+  constexpr int kMostRounds = 30;  // a round mends faults that do not touch one another
+  // Number of faults above which nothing is mended: patches are meant for few.
   constexpr std::size_t kMostFaults = 1000;
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<std::vector<Index>> seeds = faults();
@@ -329,6 +330,8 @@ bool is_manifold(std::span<const std::array<Index, 3>> triangles, std::size_t nu
 }
 
 void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, double distance) {
+  // Largest move, as a share of the shortest edge at the vertex, and the length of the mean direction below which a fan
+  // leans to no side.
   constexpr double kShareOfEdge = 0.1, kLeastLean = 0.05;
   const std::set<Index> wanted(vertices.begin(), vertices.end());
   std::map<Index, std::set<Index>> neighbors;

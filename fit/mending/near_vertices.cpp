@@ -2,6 +2,7 @@
 #include "subvol/fit/mending/near_vertices.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 
 #include <Eigen/Geometry>
 
@@ -177,11 +178,10 @@ class CrackSets {
 };
 
 bool CrackSets::find_pairs() {
-  constexpr std::size_t kMostPairs = 10'000'000;
+  constexpr std::size_t kMostPairs = 10'000'000;  // tests of distances, to bound the time
   std::vector<Index> vertices;
   for (const auto& edge : rims_) vertices.insert(vertices.end(), edge.begin(), edge.end());
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  sort_unique(vertices);
   VertexGrid before(positions_, vertices, distance_);
   if (!before.is_usable()) return false;
   std::size_t cost = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/mending/surface_faults.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/triangle_meeting.h"
@@ -56,10 +57,8 @@ SurfaceFaults find_faults(const PolygonMesh& surface, MendingGoal goal, const st
   for (const Index t : found.degenerate) faults.flat.push_back(face[t]);
   for (const auto& [t, s] : found.pairs)
     faults.meeting.push_back({std::min(face[t], face[s]), std::max(face[t], face[s])});
-  std::sort(faults.flat.begin(), faults.flat.end());
-  faults.flat.erase(std::unique(faults.flat.begin(), faults.flat.end()), faults.flat.end());
-  std::sort(faults.meeting.begin(), faults.meeting.end());
-  faults.meeting.erase(std::unique(faults.meeting.begin(), faults.meeting.end()), faults.meeting.end());
+  sort_unique(faults.flat);
+  sort_unique(faults.meeting);
   if (goal == MendingGoal::layers) faults.hidden = visible_normals(surface).hidden;
   return faults;
 }

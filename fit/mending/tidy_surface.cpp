@@ -2,6 +2,7 @@
 #include "subvol/fit/mending/tidy_surface.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/surface/orientation.h"
 #include "subvol/surface/welded_surface.h"
 
@@ -77,8 +78,7 @@ class OpenVertices {
         box.extend(positions_[v]);
       }
     if (!box.isEmpty()) box.sizes().maxCoeff(&axis_);
-    std::ranges::sort(vertices_);
-    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+    sort_unique(vertices_);
     std::ranges::stable_sort(vertices_, {}, [&](Index v) { return positions_[v][axis_]; });
   }
 

@@ -11,7 +11,7 @@
 namespace subvol::internal {
 namespace {
 
-constexpr double kLeastVisibility = 1e-6;
+constexpr double kLeastVisibility = 1e-6;  // least cosine to all normals; below it, rounding decides
 constexpr std::size_t kFew = 64;  // number of normals up to which their cap is found directly, in any order
 
 /// A cap of the unit sphere: all points p with axis . p >= cosine.

@@ -12,7 +12,7 @@
 
 namespace subvol {
 
-inline constexpr int kNumHistogramBins = 20;
+inline constexpr int kNumHistogramBins = 20;  ///< of scaled Jacobians from -1 to 1, each 0.1 wide
 
 /// Quality of the cells of a mesh, and what is proved about them.
 struct QualityReport {

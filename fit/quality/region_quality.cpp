@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/elements/pattern_table.h"
 #include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/elements/shape_functions.h"
@@ -69,8 +70,7 @@ class Regions {
   Regions(const CellLabels& labels, std::size_t num_cells) : labels_(labels) {
     if (labels.references.empty() && num_cells > 0) numbers_ = {0};
     numbers_.insert(numbers_.end(), labels.references.begin(), labels.references.end());
-    std::ranges::sort(numbers_);
-    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
+    sort_unique(numbers_);
   }
 
   std::size_t size() const { return numbers_.size(); }

@@ -14,7 +14,7 @@
 
 namespace subvol {
 
-/// What is true of one region: the cells of one reference.
+/// The figures of one region, that is, of the cells of one reference.
 struct RegionQuality {
   int reference;
   std::string name;  ///< of its group in `VolumeMesh::regions`; may be empty
@@ -24,13 +24,14 @@ struct RegionQuality {
   double min_scaled_jacobian = 1;
 };
 
-/// What is true of the faces between two regions.
+/// The figures of the faces between two regions.
 struct InterfaceArea {
   std::array<int, 2> references;
   std::size_t num_faces = 0;
   double area = 0;
 };
 
+/// The figures of all regions of a mesh, and of their interfaces.
 struct RegionReport {
   std::vector<RegionQuality> regions;     ///< ascending by reference
   std::vector<InterfaceArea> interfaces;  ///< ascending by pair

@@ -12,8 +12,10 @@ namespace subvol::internal {
 
 namespace {
 
+/// Pairs of steps and changes of the gradient that are kept, steps over which the decrease is judged, and evaluations
+/// of one line search.
 constexpr int kHistory = 10, kWindow = 10, kMaxTrials = 40;
-constexpr double kArmijo = 1e-4, kWolfe = 0.9;
+constexpr double kWolfe = 0.9;  // the usual factor on the slope for quasi-Newton methods
 
 struct Value {
   double surface = 0, volume = 0, energy = std::numeric_limits<double>::infinity();

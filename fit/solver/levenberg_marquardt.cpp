@@ -16,10 +16,12 @@ namespace subvol::internal {
 
 namespace {
 
+/// Range of mu, and of its product with a local factor: relative to the diagonal of the Hessian, 1e4 stops a degree of
+/// freedom, and 1e-4 has hardly any effect.
 constexpr double kLeastDamping = 1e-4, kMostDamping = 1e4;
 constexpr double kLess = 0.3, kMore = 6;  // factors on mu after a step that was taken at once, and one that was not
-constexpr double kMostLocalDamping = 1e6;
-constexpr int kMostTrials = 8;
+constexpr double kMostLocalDamping = 1e6;  // largest local factor, so that it can fall again within a few steps
+constexpr int kMostTrials = 8;             // of a step, each with a larger mu: kMore^8 = 1.7e6
 
 /// Returns the cells whose energy rises most, as few as account for half of all rises.
 std::vector<Index> most_risen(std::span<const double> before, std::span<const double> after) {
@@ -76,6 +78,7 @@ LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Ve
 }
 
 void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> diagonal) {
+  // Share of the mean of the diagonal. A degree of freedom without energy must not make the matrix singular.
   constexpr double kRounding = 1e-12;
   std::vector<double> added(diagonal.size());
   double mean = 0;
@@ -114,6 +117,8 @@ void LevenbergMarquardtRun::damp_where_shortened() {
 }
 
 bool LevenbergMarquardtRun::shorten_where_harmful() {
+  // The steps of ruined cells are halved, and are 0 in the last passes. The same number of passes stops cells that lose
+  // their certificate.
   constexpr int kHalvings = 10, kStops = 4;
   for (int pass = 0; pass < kHalvings + kStops; ++pass) {
     const std::vector<Index> ruined = problem_.volume->ruined(y_, y_trial_);
@@ -142,7 +147,7 @@ void LevenbergMarquardtRun::evaluate_trial() {
 }
 
 bool LevenbergMarquardtRun::shorten_until_downhill() {
-  constexpr int kMostShortenings = 8;
+  constexpr int kMostShortenings = 8;  // of one step at the cells whose energy rises most
   std::vector<double> cells;
   for (int pass = 0; shorten_where_harmful(); ++pass) {
     evaluate_trial();
@@ -185,6 +190,7 @@ bool LevenbergMarquardtRun::admits_step(IterationRecord&) {
 }
 
 MinimizerResult LevenbergMarquardtRun::run() {
+  // Number of steps after which a run begins anew, so that it can be resumed there: checkpoints hold no damping.
   constexpr int kStepsBetweenStates = 8;
   for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
     if (iteration > 0 && iteration % kStepsBetweenStates == 0) {

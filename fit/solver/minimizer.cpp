@@ -8,9 +8,7 @@
 #include <iterator>
 #include <string>
 
-namespace subvol {
-
-using namespace internal;
+namespace subvol::internal {
 
 namespace {
 
@@ -50,4 +48,4 @@ void densify_again(FitProblem& problem, const MinimizerResult& result) {
   for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells, nodes);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

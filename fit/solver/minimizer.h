@@ -2,30 +2,18 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/fit/solver/iteration_record.h"
 
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
-namespace internal {
 struct FitProblem;
-}
 
-/// Why a minimization ended; infeasible_start: at once, because E is infinite at the start.
-enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
-
-/// One step of a minimizer.
-struct IterationRecord {
-  double surface_energy = 0, volume_energy = 0;  ///< E_S and E_W (dimensionless), E = E_S + lambda E_W   Paper: Eq. 1
-  /// Accepted fraction of the search direction; 1 for Levenberg-Marquardt steps, which are shortened locally.
-  double step_length = 0;
-  int linear_iterations = 0;  ///< CG iterations of this step
-  int evaluations = 0;  ///< energies of its line search; Levenberg-Marquardt: values of the damping that were tried
-};
-
+/// How a minimization ended, and its steps.
 struct MinimizerResult {
   MinimizerStop stop;
   std::string explanation;  ///< the test that ended it, with its figure
@@ -37,8 +25,10 @@ struct MinimizerResult {
 
 /// Repeats the quadrature refinements of this result in the problem, so that E is the same function again.
 /// InputError: `densified` and `densified_at` do not fit the problem.
-void densify_again(internal::FitProblem& problem, const MinimizerResult& result);
+void densify_again(FitProblem& problem, const MinimizerResult& result);
 
+/// Share of the decrease that the slope promises which a step of a line search must reach: the usual one.
+inline constexpr double kArmijo = 1e-4;
 /// Damping with which the Levenberg-Marquardt method usually begins.
 inline constexpr double kFirstDamping = 1e-3;
 
@@ -80,4 +70,4 @@ bool has_ended(const MinimizerOptions& options, MinimizerResult& result);
 /// caller wants to stop.
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -73,7 +73,7 @@ bool NewtonRun::has_no_gradient() const {
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
-  constexpr int kMaxStiffenings = 5;
+  constexpr int kMaxStiffenings = 5;  // each makes cells ten times stiffer: docs/fitting.md, "Steps"
   blocking_.clear();
   is_stiffened_ = false;
   for (int round = 0;; ++round) {
@@ -94,8 +94,7 @@ NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
 }
 
 NewtonRun::Search NewtonRun::search_line(bool may_stiffen, IterationRecord& record) {
-  constexpr double kArmijo = 1e-4;
-  constexpr int kMaxHalvings = 30;
+  constexpr int kMaxHalvings = 30;  // a step of 1e-9 is none
   problem_.multiply_samples(d_, dz_);
   bool cut_back = false, drawn_back = !problem_.volume->keeps_off_inversion();
   for (int halving = 0; halving < kMaxHalvings; ++halving, t_ *= 0.5) {

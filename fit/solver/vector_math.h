@@ -11,7 +11,7 @@ namespace subvol::internal {
 
 /// sum_i a_i . b_i over arrays of points of equal size. Fixed slices, summed in order: same bits for any thread count.
 inline double dot(std::span<const Vec3> a, std::span<const Vec3> b) {
-  constexpr std::size_t kSlices = 64;
+  constexpr std::size_t kSlices = 64;  // more than any machine's threads that help at this
   std::array<double, kSlices> sums{};
 #pragma omp parallel for schedule(static)
   for (std::size_t s = 0; s < kSlices; ++s) {

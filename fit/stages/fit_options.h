@@ -4,17 +4,13 @@
 #include "subvol/fit/energies/correspondence.h"
 #include "subvol/fit/energies/distortion_kind.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/target/target_surface.h"
-#include "subvol/subdivision/boundary_rules.h"
+#include "subvol/subdivision/boundary_rule.h"
 
-#include <functional>
 #include <optional>
 
 namespace subvol {
-
-namespace internal {
-class StageLog;
-}
 
 /// Least scaled Jacobian that fits aim at.
 inline constexpr double kUsualQuality = 0.65;
@@ -27,18 +23,20 @@ enum class FittedSurface {
   mesh    ///< the refined mesh itself (the paper's plain S)
 };
 
+/// The method that minimizes the energy.
 enum class SolverKind { newton, lbfgs };
 
+/// Options of `fit_subdivision_volume`.
 struct FitOptions {
   int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
-  /// The fit ends once the mean distance is at most this, in per cent of the target's diagonal; > 0.
+  /// The fit ends once the mean distance is at most this, in percent of the target's diagonal; > 0.
   std::optional<double> tolerance_percent;
   FittedSurface surface = FittedSurface::limit;
   BoundaryRule boundary = BoundaryRule::catmull_clark;
   bool cage_only = false;                        ///< the degrees of freedom stay the vertices of the given template
   /// Weights of E_W, > 0. lambda_far: cap on lambda while a level is started. lambda_close: lambda of the last stage on
-  /// the finest level; if the fit is not accurate enough, lambda is lowered below it (`kLeastDefaultLambdaShare`,
-  /// `kLeastLambdaShare`).
+  /// the finest level; if the fit is not accurate enough, lambda is lowered below it: to a sixteenth of it at
+  /// least, or to a thousandth if there is a tolerance.
   double lambda_far = 1.0, lambda_close = 0.005;
   /// Edges of the target sharper than this angle stay sharp if the template has edges that follow them: those template
   /// edges become creases and are drawn to the target's edges. In [0, 180]. Empty: only the template's own tags are
@@ -52,14 +50,8 @@ struct FitOptions {
   Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
   /// Least scaled Jacobian to aim at on the finest level, in [0, 0.8], as far as the distances allow; 0: none.
   double quality = kUsualQuality;
-  int max_iterations = 0;                        ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;                 ///< 0: no limit
+  SolveControl control{};
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
-  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
-  std::function<bool()> cancelled;
-  /// Supplies the results of earlier minimizations and records new ones; null: no log.
-  internal::StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills FitResult::states
 };
 

@@ -3,7 +3,7 @@
 
 #include "subvol/base/types.h"
 #include "subvol/fit/features/crease_distance.h"
-#include "subvol/fit/solver/minimizer.h"
+#include "subvol/fit/solver/iteration_record.h"
 #include "subvol/fit/target/target_report.h"
 
 #include <algorithm>
@@ -15,14 +15,6 @@
 
 namespace subvol {
 
-/// Progress, reported at each step. `level` is 0 if there are no levels; `fraction` estimates the share of the work
-/// that is done, in [0, 1].
-struct FitProgress {
-  const char* stage;
-  int level, iteration;
-  double energy, fraction;
-};
-
 /// Reason why a solve ended. Invalid input throws instead, and so does memory that runs out before there is a result.
 enum class StopReason {
   converged,  ///< all stages ended by their stop tests or step counts; the tolerance, if any, is met
@@ -33,6 +25,7 @@ enum class StopReason {
   cancelled,     ///< a callback canceled the run; the best state so far is returned
   stalled        ///< a level or stage could not start or go on without inverting a cell, or invalid cells remain
 };
+/// Returns the name of a reason as it stands in reports, such as "time_limit".
 const char* to_string(StopReason reason);
 
 /// Returns the stop reason of work that ends with this minimization. No acceptable step and an infeasible start give
@@ -54,7 +47,7 @@ struct StageRecord {
   bool kept = true;
   bool raises_quality = false;     ///< it minimized the quality energy (`QualityStages`)
   double seconds = 0;
-  double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
+  double mean_distance_percent = -1;  ///< after the stage, percent of the diagonal; negative: not measured
 };
 
 /// Record of a fit and the properties of its result.

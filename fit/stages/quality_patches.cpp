@@ -2,6 +2,7 @@
 #include "subvol/fit/stages/quality_patches.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -118,8 +119,7 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
     if (const Index j = free_of_triangle[t]; j != kNoIndex)
       patches[patch_of_set[joined.set_of(j)]].triangles.push_back(static_cast<Index>(t));
   for (QualityPatch& patch : patches) {
-    std::sort(patch.vertices.begin(), patch.vertices.end());
-    patch.vertices.erase(std::unique(patch.vertices.begin(), patch.vertices.end()), patch.vertices.end());
+    sort_unique(patch.vertices);
   }
   return patches;
 }

@@ -11,7 +11,11 @@
 
 namespace subvol::internal {
 
-/// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are ascending.
+/// Share of all cells up to which patches cost less than the whole mesh.
+inline constexpr double kMostPatchShare = 0.4;
+
+/// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are
+/// ascending.
 struct QualityPatch {
   std::vector<Index> unknowns;   ///< degrees of freedom that move
   std::vector<Index> cells;      ///< those with a vertex that moves with them

@@ -2,6 +2,7 @@
 #include "subvol/fit/stages/quality_stages.h"
 
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/solver/levenberg_marquardt.h"
 #include "subvol/mesh/mesh_topology.h"
 
@@ -21,16 +22,14 @@ constexpr double kMargin = 0.15;
 /// A coarse mesh needs no more than this below the goal: refining raises the mean, and the lift of the fine mesh the
 /// least.
 constexpr double kCoarseMargin = 0.05;
-constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;
+constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;  // of the lift of a whole mesh
 
 /// Width of the strip of surface that counts as much as a crease, in edges.
 constexpr double kCreaseEdges = 5;
 
-/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; the share of all
-/// cells up to which patches cost less than the whole mesh; and the shares of the goal below which cells are lifted:
-/// the first for which patches are that small.
+/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; and the shares of
+/// the goal below which cells are lifted: the first for which patches are small (`kMostPatchShare`).
 constexpr std::array<int, 3> kPatchRings{1, 3, 2};
-constexpr double kMostPatchShare = 0.4;
 constexpr std::array<double, 4> kPatchShares{1, 0.85, 0.6, 0.3};
 
 /// Exponent of the norm of all costs of a state (`LiftMerit`).
@@ -41,7 +40,7 @@ double above(double goal, double margin = kMargin) { return std::min(0.95, goal 
 }  // namespace
 
 double LiftMerit::cost_of_cell(double share) const {
-  constexpr double kPoor = 0.8;
+  constexpr double kPoor = 0.8;  // share of the goal below which a cell costs more
   return 1 - share + poor * std::max(0.0, kPoor - share);
 }
 
@@ -224,6 +223,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
 /// Raises the emphasis of sample triangles that are too far from the target, and notes the cells at
 /// triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
 double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
+  // Factors on the emphasis of a triangle that is too far, or near enough, and the largest emphasis.
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
@@ -242,8 +242,7 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
     if (shares[t] > 1 && !triangle_cells_.empty()) state.far_cells.push_back(triangle_cells_[t]);
   }
   surface_->weigh(std::move(factors));
-  std::sort(state.far_cells.begin(), state.far_cells.end());
-  state.far_cells.erase(std::unique(state.far_cells.begin(), state.far_cells.end()), state.far_cells.end());
+  sort_unique(state.far_cells);
   return costs;
 }
 
@@ -323,7 +322,7 @@ bool QualityStages::run_patches(const QualitySchedule& of_patch, std::span<const
 bool QualityStages::relax(std::span<const Index> centers, int rings, const QualityStage& stage,
                           const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x,
                           FitReport& report) {
-  constexpr double kNoGoal = 0.1;
+  constexpr double kNoGoal = 0.1;  // scaled Jacobian; of no effect, since there is no lift
   runner_ = &runner;
   record_ = record;
   report_ = &report;
@@ -336,7 +335,7 @@ bool QualityStages::relax(std::span<const Index> centers, int rings, const Quali
 /// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kSteps = 2, kPatience = 5;
+  constexpr int kSteps = 2, kPatience = 5;  // of a round; rounds without a better state
   constexpr double kWorthwhile = 0.7;  // a round of the whole mesh must leave less than this share of the poor cells
   const bool is_patch = patch_mesh_ != nullptr;
   // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:

@@ -67,6 +67,9 @@ struct QualitySchedule {
   void give_surface_more_weight(double factor);
 };
 
+/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
+inline constexpr double kMaxMargin = 0.8;
+
 /// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.
 inline constexpr double kLateFarMargin = 0.9;
 
@@ -116,7 +119,7 @@ class QualityStages {
 
   /// A state that the lift reached.
   struct State {
-    static constexpr double kNotJudged = -1e300;
+    static constexpr double kNotJudged = -1e300;  // below the merit of every state
     QualityEnergy::State cells;
     double merit = kNotJudged;       ///< see `LiftMerit`. 1: all aims are reached
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending

@@ -33,9 +33,9 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   record.unknowns = x.size();
   record.raises_quality = stage.longest_move > 0;
   MinimizerOptions minimizer;
-  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
+  minimizer.max_iterations = control_.max_iterations > 0 ? control_.max_iterations : stage.max_iterations;
   if (stage.longest_move > 0) minimizer.max_iterations = std::min(minimizer.max_iterations, stage.max_iterations);
-  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0 && stage.longest_move == 0)
+  if (solver_ == SolverKind::lbfgs && control_.max_iterations == 0 && stage.longest_move == 0)
     minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
   minimizer.longest_move = stage.longest_move;
@@ -50,15 +50,15 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.progress = [&](const IterationRecord& step) {
     const double energy = step.surface_energy + stage.lambda * step.volume_energy;
     work_->add(step_work);
-    const bool wanted = !options_.progress ||
-                        options_.progress({record.name.c_str(), record.level, ++iteration, energy, work_->share()});
+    const bool wanted = !control_.progress ||
+                        control_.progress({record.name.c_str(), record.level, ++iteration, energy, work_->share()});
     return wanted && !is_over();
   };
   // A stage recalled from a log leaves no correspondences behind, so those left by a solved stage must not matter
   // either.
   if (problem.surface) problem.surface->forget();
-  SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
-  const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;
+  SolvedStage solved{record.name, control_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
+  const SolvedStage* known = control_.log ? control_.log->recall(solved) : nullptr;
   if (known) solved = *known;
   bool going = true;
   if (!known || !known->is_over()) {
@@ -104,7 +104,7 @@ bool StageRunner::in_time(const std::string& work, FitReport& report) const {
 }
 
 void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const {
-  constexpr double kFarPercent = 10;
+  constexpr double kFarPercent = 10;  // of the diagonal, on the mean; results of templates in their place are below 1 %
   if (mean_percent > kFarPercent)
     report.warnings.push_back(formatted(
         "the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
@@ -120,10 +120,10 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
     report.explanation =
         formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
   } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
-             options_.max_iterations > 0) {
+             control_.max_iterations > 0) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
-                                   options_.max_iterations, mean_percent);
+                                   control_.max_iterations, mean_percent);
   } else {
     report.stop_reason = StopReason::converged;
     report.explanation = formatted("all stages done, mean distance %.4g %%", mean_percent);
@@ -134,18 +134,18 @@ void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedS
   const double begin = seconds() - stage.seconds;
   const MinimizerResult begun = stage.result;
   if (!begun.iterations.empty()) minimizer.begun = &begun;
-  if (options_.log)
+  if (control_.log)
     minimizer.keep = [&](std::span<const Vec3> x, const MinimizerResult& so_far) {
       SolvedStage kept{stage.name, stage.start, std::vector<Vec3>(x.begin(), x.end()), so_far, seconds() - begin};
       kept.result.stop = MinimizerStop::cancelled;
-      options_.log->add(std::move(kept));
+      control_.log->add(std::move(kept));
     };
-  const auto minimize = minimizer.longest_move > 0              ? minimize_levenberg_marquardt
-                        : options_.solver == SolverKind::lbfgs ? minimize_lbfgs
-                                                               : minimize_newton;
+  const auto minimize = minimizer.longest_move > 0     ? minimize_levenberg_marquardt
+                        : solver_ == SolverKind::lbfgs ? minimize_lbfgs
+                                                       : minimize_newton;
   stage.result = minimize(problem, stage.x, minimizer);
   stage.seconds = seconds() - begin;
-  if (options_.log && stage.is_over()) options_.log->add(stage);
+  if (control_.log && stage.is_over()) control_.log->add(stage);
 }
 
 }  // namespace subvol::internal

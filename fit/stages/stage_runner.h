@@ -5,6 +5,7 @@
 #include "subvol/fit/solver/minimizer.h"
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/stages/stage.h"
 #include "subvol/fit/stages/stage_log.h"
 #include "subvol/fit/stages/work_share.h"
@@ -26,22 +27,13 @@ namespace subvol::internal {
 /// Runs the minimizations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:
-  /// The fit's options that apply to all stages.
-  struct Options {
-    SolverKind solver = SolverKind::newton;
-    int max_iterations = 0;         ///< 0: as the stage says
-    double time_limit_seconds = 0;  ///< 0: no limit
-    std::function<bool(const FitProgress&)> progress;
-    std::function<bool()> cancelled;
-    StageLog* log = nullptr;        ///< null: no log
-  };
+  explicit StageRunner(SolveControl control, SolverKind solver = SolverKind::newton)
+      : control_(std::move(control)), solver_(solver) {}
 
-  explicit StageRunner(Options options) : options_(std::move(options)) {}
-
-  /// Returns a runner with the same options, clock and share of work, but without the log.
+  /// Returns a runner with the same limits, callbacks, clock and share of work, but without the log.
   StageRunner without_log() const {
     StageRunner result = *this;
-    result.options_.log = nullptr;
+    result.control_.log = nullptr;
     return result;
   }
 
@@ -74,18 +66,19 @@ class StageRunner {
   void give_up(const std::string& work, FitReport& report) const;
 
   /// Returns true if the current work must be interrupted: the time is over, or the caller cancels.
-  bool is_to_end() const { return is_over() || (options_.cancelled && options_.cancelled()); }
+  bool is_to_end() const { return is_over() || (control_.cancelled && control_.cancelled()); }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
+  bool is_over() const { return control_.time_limit_seconds > 0 && seconds() > control_.time_limit_seconds; }
   /// Minimizes from the stage's x, continuing the steps that its result already records.
   void solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const;
 
-  Options options_;
+  SolveControl control_;
+  SolverKind solver_;
   Clock::time_point start_ = Clock::now();
   std::shared_ptr<WorkShare> work_ = std::make_shared<WorkShare>();  ///< never null; the same one in all copies
 };

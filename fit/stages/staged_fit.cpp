@@ -23,8 +23,8 @@ void StagedFit::keep_state() {
 }
 
 bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t& pairs) {
-  constexpr double kFactor = 4;
-  for (double lambda = kFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kFactor) {
+  constexpr double kUnfoldingFactor = 4;  // on lambda: 0.005 becomes 0.02 and 0.08 (docs/fitting.md, "The schedule")
+  for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kUnfoldingFactor) {
     FitSnapshot softer = snapshot();
     const std::optional<std::size_t> pairs_now = or_back(softer, [&] {
       unknowns() = start.x;

@@ -62,7 +62,7 @@ class StagedFit {
 
   std::vector<FitState> states_;  ///< states of the current attempt, numbered like the degrees of freedom
   double lambda_ = 0;             ///< lambda of the last stage
-  std::optional<double> mean_;    ///< mean distance of the current state, in per cent of the diagonal
+  std::optional<double> mean_;    ///< mean distance of the current state, in percent of the diagonal
 
  private:
   bool keep_states_;

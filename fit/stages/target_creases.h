@@ -19,8 +19,9 @@ struct CreaseRule {
   bool follows_all_edges = true;
 };
 
-/// Tags a template, in normalized coordinates, with the creases that follow these edges of the target. Without an angle,
-/// those of its own creases are followed that lie along sharp edges. Returns no creases if the target is a cloud.
+/// Tags a template, in normalized coordinates, with the creases that follow these edges of the target. Without an
+/// angle, those of its own creases are followed that lie along sharp edges. Returns no creases if the target is a
+/// cloud.
 FollowedCreases creases_along_target(const FitTarget& target, const CreaseRule& rule, VolumeMesh& template_mesh);
 
 /// Makes the interfaces between the template's regions follow those that the target has, or keep their own shape, sharp

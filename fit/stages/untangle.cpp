@@ -20,6 +20,8 @@ constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
 constexpr double kStuck = 0.1;
 /// Factor on the weight of cells that are not certified after such a round.
 constexpr double kWeightGrowth = 1.5;
+/// A round ends after so many steps, or when two steps in a row decrease the energy by a smaller share than this:
+/// the next epsilon changes it anyway.
 constexpr int kSteps = 5;
 constexpr double kRelativeDecrease = 1e-2;
 /// Relative rise of the worst determinant that counts as a gain even if no fewer cells fail.

@@ -16,7 +16,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kNeighbors = 16;
+constexpr std::size_t kNeighbors = 16;  // of a point, for its normal and its area (docs/fitting.md)
 constexpr double kLeastShare = 1e-20;   // floor of a squared radius, as a share of diagonal^2 (k + 1) / n
 constexpr double kSlack = 1 + 1e-14;    // the tree sums squared distances in another order
 

@@ -16,7 +16,7 @@ namespace {
 double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, double most) {
   constexpr double kOpposite = -0.866;  // cosine of 150 degrees
   constexpr double kTouching = 0.98;    // a ball is empty if the surface is farther than this share of its radius
-  constexpr int kMostRounds = 30;
+  constexpr int kMostRounds = 30;       // the radius falls in each, and rounding must not keep it falling
   double radius = most, cosine = 1;
   for (int round = 0; round < kMostRounds; ++round) {
     const Vec3 center = p + radius * n;
@@ -35,7 +35,7 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
 
 FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most,
                            const std::function<bool()>& cancelled) {
-  constexpr std::size_t kBetweenQuestions = 4096;
+  constexpr std::size_t kBetweenQuestions = 4096;  // samples between two questions whether to stop
   if (!(least >= 0) || !(most > least) || !std::isfinite(most))
     throw InputError("feature sizes: the largest radius must be finite and above the smallest, which must be >= 0");
   FeatureSizes features;

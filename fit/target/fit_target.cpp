@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/fit_target.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/mesh/interfaces.h"
@@ -61,8 +62,7 @@ FitTarget::FitTarget(const RegionSurface& target) : FitTarget(outer_surface(targ
   interfaces = normalized(inner_surface(target, numbers), normalization);
   std::vector<std::array<int, 2>> pairs;
   for (const Index t : numbers) pairs.push_back(target.pair(static_cast<std::size_t>(t)));
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   for (const Index t : numbers) {
     const auto at = std::ranges::lower_bound(pairs, target.pair(static_cast<std::size_t>(t)));
     group_of_interface_triangle.push_back(1 + static_cast<Index>(at - pairs.begin()));
@@ -114,8 +114,7 @@ class TrianglesByGroup {
     std::vector<Index> vertices;
     for (const Index t : triangles)
       vertices.insert(vertices.end(), surface_.triangles[t].begin(), surface_.triangles[t].end());
-    std::ranges::sort(vertices);
-    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    sort_unique(vertices);
     TriangleMesh result;
     for (const Index v : vertices) result.positions.push_back(surface_.positions[v]);
     const auto number = [&](Index v) {

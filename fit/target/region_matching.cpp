@@ -61,7 +61,7 @@ bool has_cavity(const VolumeMesh& mesh) {
 }  // namespace
 
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh) {
-  constexpr double kInside = 0.5;
+  constexpr double kInside = 0.5;  // winding number: halfway between outside, 0, and inside, 1
   const std::vector<int> references = region_references(mesh);
   if (references.size() < 2) return std::nullopt;
   std::optional<RegionSurface> regions = find_so_many_regions(target, references.size());

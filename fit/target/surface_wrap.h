@@ -10,6 +10,7 @@ namespace subvol {
 /// Limits of `WrapOptions::voxel_percent`.
 inline constexpr double kLeastWrapPercent = 0.1, kMostWrapPercent = 10;
 
+/// Options of `wrap_surface`.
 struct WrapOptions {
   /// Edge of the voxels that the inside is made of, in percent of the diagonal, within the limits above. What is
   /// thinner or narrower than two of them may be lost or closed.

@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kClosedEnough = 0.95;  // share of paired half-edges above which the signed sum is trusted
 constexpr double kFlatness = 1e-6;      // share of the isoperimetric bound below which nothing is enclosed
-constexpr int kFloodResolution = 96;
+constexpr int kFloodResolution = 96;    // cells along the longest axis, with which the space outside is flooded
 constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
 /// Samples up to which triangles are sampled along their whole length, however thin they are.
 constexpr std::size_t kManySamples = 2'000'000;

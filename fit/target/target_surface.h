@@ -21,8 +21,8 @@ class GroupedClosestPoint;
 struct TargetSurfaceOptions {
   /// Triangles with longer edges are sampled more than once; > 0, in the mesh's unit. 0: one sample per triangle.
   double sample_spacing = 0;
-  /// Enclosed volume, > 0, if it is known: of the boundary alone, if the triangles of interfaces are among them. 0: it is
-  /// found.
+  /// Enclosed volume, > 0, if it is known: of the boundary alone, if the triangles of interfaces are among them. 0: it
+  /// is found.
   double volume = 0;
 };
 
@@ -31,6 +31,7 @@ enum class PointWeights {
   equal,   ///< the same for all: dense parts count more (default)
   by_area  ///< the area that it represents (`cloud_geometry.h`): scans of uneven density count evenly
 };
+/// Returns the word for weights in options.
 const char* to_string(PointWeights weights);
 
 /// How the enclosed volume was found.
@@ -42,6 +43,7 @@ enum class VolumeSource {
   isoperimetric,  ///< half the volume of the sphere of equal area: the surface encloses nothing
   given           ///< set by the caller
 };
+/// Returns the source in words, as it stands in reports.
 const char* to_string(VolumeSource source);
 
 /// The target as the energies need it: triangles with normals, area A, enclosed volume V and samples; or points.
@@ -51,10 +53,11 @@ const char* to_string(VolumeSource source);
 class TargetSurface {
  public:
   /// mesh   must have finite positions of its triangles' corners, corner numbers in range, at least one triangle with
-  ///        an area, and an extent that `require_length` accepts, else InputError. Triangles without area are dropped;
+  ///        an area, and an extent between 1e-40 and 1e40, else InputError. Triangles without area are dropped;
   ///        the others keep their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
-  /// InputError: as for `cloud_geometry`.
+  /// InputError: fewer than two points, a position that is not finite, an extent as above, or points that lie on each
+  /// other in groups, so that they have no area.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
 
   /// Returns the center of the bounding box that the target made of a surface has. InputError: as the constructor.
@@ -105,8 +108,9 @@ class TargetSurface {
   /// Samples the surface anew with another spacing. A cloud keeps its points. InputError: the spacing is negative, not
   /// finite, or far too small.
   void resample(double spacing);
-  /// Keeps at most so many samples, which then stand for all: of the samples in the order of the tree's triangles, where
-  /// neighbors in space are mostly neighbors, those in the middle of equal parts of the area. A cloud keeps its points.
+  /// Keeps at most so many samples, which then stand for all: of the samples in the order of the tree's triangles,
+  /// where neighbors in space are mostly neighbors, those in the middle of equal parts of the area. A cloud keeps its
+  /// points.
   /// InputError: most = 0.
   void thin(std::size_t most);
 

@@ -144,7 +144,7 @@ void flush_folder(const fs::path& target) {
 }  // namespace
 
 fs::path behind_links(const fs::path& path) {
-  constexpr int kMostLinks = 40;
+  constexpr int kMostLinks = 40;  // as many as Linux follows
   fs::path target = path;
   std::error_code ignored;
   for (int i = 0; i < kMostLinks; ++i) {

@@ -14,7 +14,7 @@ Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::
 
 Eigen::VectorXd least_norm_solution(const std::vector<MatrixEntry>& entries, const Eigen::VectorXd& right) {
   constexpr Eigen::Index kMostDense = 300;  // a tenth of a second
-  constexpr double kTolerance = 1e-12;
+  constexpr double kTolerance = 1e-12;      // relative residual
   const Eigen::Index n = right.size();
   if (n <= kMostDense) {
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);

@@ -31,7 +31,7 @@ constexpr std::size_t kNotFound = std::string_view::npos;
 /// Returns true if the first kUnits units of two bytes (or all of them, if there are fewer but at least one) are
 /// printable or blank ASCII. zero: which byte of a unit must be 0; 0 for big-endian, 1 for little-endian.
 bool has_wide_ascii(std::string_view bytes, std::size_t zero) {
-  constexpr std::size_t kUnits = 4;
+  constexpr std::size_t kUnits = 4;  // more than a binary file has of such bytes by chance
   if (bytes.size() < 2) return false;
   for (std::size_t i = 0; i < std::min(bytes.size() / 2, kUnits); ++i) {
     const char c = bytes[2 * i + 1 - zero];
@@ -199,7 +199,7 @@ std::optional<double> parse_number(std::string_view word) {
 std::optional<std::int64_t> parse_integer(std::string_view word) { return parse<std::int64_t>(word); }
 
 std::string in_quotes(std::string_view word) {
-  constexpr std::size_t kLongest = 40;
+  constexpr std::size_t kLongest = 40;  // characters
   std::string text = "'";
   for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
   return text + (word.size() > kLongest ? "...'" : "'");

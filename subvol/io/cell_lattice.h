@@ -30,7 +30,7 @@ enum class NodeOrdering {
 /// kind with its corners first.
 std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering ordering);
 
-/// Number of these points.
+/// Returns the number of these points. InputError: as above.
 std::size_t num_lattice_points(CellKind kind, int order);
 
 }  // namespace subvol

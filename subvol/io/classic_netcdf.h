@@ -12,8 +12,8 @@ namespace subvol::internal {
 ///
 /// name   of the file, for messages.
 /// bytes  another format, such as HDF5, is not looked at.
-/// InputError: a count, a name or a list is longer than the rest of the file; a tag, a type or a dimension is unknown; a
-/// variable has more than 1024 dimensions, or one of length 0 that is not its first.
+/// InputError: a count, a name or a list is longer than the rest of the file; a tag, a type or a dimension is unknown;
+/// a variable has more than 1024 dimensions, or one of length 0 that is not its first.
 /// Source: the "File Format Specifications" of the netCDF documentation.
 void require_sound_netcdf_header(const std::string& name, std::string_view bytes);
 

@@ -20,7 +20,7 @@ class ColorGroups {
  public:
   /// color  name of the next face's color; empty: it has none.
   void add_face(const std::string& color);
-  /// Returns the groups, or none. Colors that do not become groups count as left out.
+  /// Returns the groups, or none. Colors that do not become groups are added to `left_out` under the name `what`.
   FaceGroups take(LeftOut& left_out, const char* what);
   /// Returns the number of faces that have a color.
   std::size_t num_colored() const { return num_colored_; }

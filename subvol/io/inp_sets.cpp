@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/io/inp_sets.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/base/text_scanner.h"
 
 #include <algorithm>
@@ -87,8 +88,7 @@ const std::vector<Index>& InpSets::members(std::size_t s, int depth) {
     }
     if (work_ > kMostWork) fail_at(item.place, std::string(keyword_) + ": sets with too many members");
   }
-  std::sort(members.begin(), members.end());
-  members.erase(std::unique(members.begin(), members.end()), members.end());
+  sort_unique(members);
   Set& set = sets_[s];
   set.members = std::move(members);
   set.is_resolved = true;

@@ -31,8 +31,9 @@ using FileCells = std::variant<VolumeMesh, NodalMesh, PolygonMesh>;
 /// Reads a file of cells, once, and returns what it holds:
 ///
 ///   VolumeMesh   linear cells, as `read_volume_mesh`
-///   NodalMesh    cells, one of which at least has order 2 or more, as `read_nodal_mesh`; not checked, its warnings in
-///   it PolygonMesh  faces without cells (.msh, .inp), as `read_polygon_mesh`
+///   NodalMesh    cells, at least one of which has order 2 or more, as `read_nodal_mesh`; they are not checked, and
+///                warnings are in the mesh
+///   PolygonMesh  faces without cells (.msh, .inp), as `read_polygon_mesh`
 ///
 /// InputError: as these.
 FileCells read_cells(const std::filesystem::path& path, const ReadOptions& options = {});

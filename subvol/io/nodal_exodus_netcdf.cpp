@@ -2,6 +2,7 @@
 // Reads Exodus II, the netCDF files of finite elements. Without netCDF, this is refused.
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/io/exodus_blocks.h"
 #include "subvol/io/nodal_formats.h"
 
@@ -415,7 +416,7 @@ class ExodusParser {
         add_face(mesh_, face, group);
         corners_of_group_.back().insert(corners_of_group_.back().end(), face.begin(), face.end());
       }
-      sort_out(corners_of_group_.back());
+      sort_unique(corners_of_group_.back());
     }
   }
 
@@ -428,13 +429,7 @@ class ExodusParser {
     for (const GroupedFace& entry : all.faces)
       for (const Index v : entry.face)
         if (v != kNoIndex) corners_of_group_[static_cast<std::size_t>(entry.group)].push_back(v);
-    for (std::vector<Index>& corners : corners_of_group_) sort_out(corners);
-  }
-
-  /// Puts nodes in ascending order, each once.
-  static void sort_out(std::vector<Index>& nodes) {
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    for (std::vector<Index>& corners : corners_of_group_) sort_unique(corners);
   }
 
   /// The nodes of a set, each once and ascending.
@@ -445,7 +440,7 @@ class ExodusParser {
     if (size == 0) return nodes;
     for (const long long node : file_.integers("node_ns" + suffix, size))
       if (node >= 1 && node <= static_cast<long long>(num_nodes_)) nodes.push_back(static_cast<Index>(node - 1));
-    sort_out(nodes);
+    sort_unique(nodes);
     return nodes;
   }
 

@@ -96,8 +96,7 @@ class InpParser {
   }
   std::int64_t label(const std::string& text, const char* what) const { return label(text, what, line_->instance); }
 
-  // --- Nodes and elements
-  // ---------------------------------------------------------------------------------------------
+  // --- Nodes and elements --------------------------------------------------------------------------------------------
 
   void open_nodes() {
     if (const std::string system = line_->parameter("SYSTEM"); !system.empty() && upper_case(system) != "R")
@@ -185,8 +184,7 @@ class InpParser {
     element_open_ = content_.element_nodes.size() < end;
   }
 
-  // --- Sets
-  // -----------------------------------------------------------------------------------------------------------
+  // --- Sets ----------------------------------------------------------------------------------------------------------
 
   /// The instance whose sets and numbers a line of a set or a surface names.
   const InpInstance* instance_of_set() const {

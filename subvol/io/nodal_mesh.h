@@ -91,7 +91,7 @@ class NodalCells {
 /// not fit together.
 NodalMesh read_nodal_mesh(const std::filesystem::path& path, const std::string& references = {});
 
-/// True if `read_nodal_mesh` reads files of this name, as far as the extension says.
+/// Returns true if `read_nodal_mesh` reads files of this name, as far as the extension says.
 bool is_nodal_extension(const std::filesystem::path& path);
 
 /// Returns true if Exodus files can be read and written: the library was built with netCDF.
@@ -100,7 +100,8 @@ bool has_exodus();
 /// Returns true if CGNS files can be read.
 bool has_cgns();
 
-/// Returns the cells as linear ones; nodes keep their numbers. InputError: a cell of order 2 or more.
+/// Returns the cells as linear ones; nodes keep their numbers. name: of the file, for messages. InputError: a cell of
+/// order 2 or more; no cells.
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh);
 
 /// Returns the cells by their corners, without groups and references. The vertices are the nodes that are corners, in

@@ -343,8 +343,7 @@ class MshParser {
     end_section("$Elements");
   }
 
-  // --- Building the mesh
-  // ----------------------------------------------------------------------------------------------
+  // --- Building the mesh ---------------------------------------------------------------------------------------------
 
   void build() {
     const auto is_cell = [](const Element& element) { return dimension(element.type->shape) == 3; };

@@ -136,7 +136,7 @@ class NastranParser {
     elements_.push_back(std::move(element));
   }
 
-  // --- Building the mesh ----------------------------------------------------------------------------------------------
+  // --- Building the mesh --------------------------------------------------------------------------------------------
 
   Index point(const Element& element, std::size_t i) const {
     const auto found = points_.find(element.nodes[i]);

@@ -2,6 +2,7 @@
 #include "subvol/io/nodal_sides.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 
 #include <algorithm>
 #include <limits>
@@ -127,8 +128,7 @@ std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, 
     group.nodes.insert(group.nodes.end(), nodes.begin(), nodes.end());
   }
   for (GroupSides& group : groups) {
-    std::sort(group.nodes.begin(), group.nodes.end());
-    group.nodes.erase(std::unique(group.nodes.begin(), group.nodes.end()), group.nodes.end());
+    sort_unique(group.nodes);
   }
   return groups;
 }

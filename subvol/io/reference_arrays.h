@@ -27,8 +27,8 @@ struct CellNumbers {
 std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arrays, const std::string& name,
                                              const std::vector<std::string>& others = {});
 
-/// Appends warnings about the arrays of cell data that did not become references: their number, and that others might be
-/// meant if none was asked for.
+/// Appends warnings about the arrays of cell data that did not become references: their number, and that others might
+/// be meant if none was asked for.
 ///
 /// chosen      from `choose_references`.  was_asked  true if an array was asked for by name.
 /// num_arrays  number of all arrays of cell data in the file.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/binary_value.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/color_groups.h"
 #include "subvol/io/left_out.h"
@@ -215,8 +216,7 @@ class PlyParser {
     if (colors_) mesh_.face_groups = colors_->take(left_out_, "colors of faces");
     if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
     std::vector<std::int64_t> found = labels_;
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
+    sort_unique(found);
     if (found.size() > kMostLabels) return left_out_.add("properties of face");
     if (label_name_ == "reference" && found.front() == 0) found.erase(found.begin());
     if (found.empty()) return;

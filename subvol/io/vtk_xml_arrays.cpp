@@ -107,7 +107,8 @@ void require_compressor(const VtkXmlArray& array, const std::string& compressor)
   fail(array, "compressed by " + in_quotes(compressor) + ", expected vtkZLibDataCompressor or vtkLZ4DataCompressor");
 }
 
-/// Blocks: their number, the size of each, that of the last if it is smaller, and their compressed sizes; then the data.
+/// Blocks: their number, the size of each, that of the last if it is smaller, and their compressed sizes; then the
+/// data.
 std::string compressed_bytes(const VtkXmlArray& array, ByteSource source, const VtkXmlStorage& storage) {
   require_compressor(array, storage.compressor);
   const std::size_t size = storage.header.size;

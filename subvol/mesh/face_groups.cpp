@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/face_groups.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
@@ -62,10 +63,7 @@ void make_names_utf8(std::vector<Group>& groups) {
   }
 }
 
-void normalize(VolumeFaceGroups& groups) {
-  std::sort(groups.faces.begin(), groups.faces.end());
-  groups.faces.erase(std::unique(groups.faces.begin(), groups.faces.end()), groups.faces.end());
-}
+void normalize(VolumeFaceGroups& groups) { internal::sort_unique(groups.faces); }
 
 Index group_of(const VolumeFaceGroups& groups, std::span<const Index> corners) {
   const FaceKey key = face_key(corners);

@@ -69,14 +69,16 @@ Index group_of(const VolumeFaceGroups& groups, std::span<const Index> corners);
 /// no groups.
 std::vector<Index> groups_of_boundary(const VolumeFaceGroups& groups, const MeshTopology& topology);
 
-/// Returns groups of boundary faces: `of_boundary_face` holds a place in `groups`, or kNoIndex, for each of them.
+/// Returns groups of boundary faces.
+///
+/// of_boundary_face  a place in `groups`, or kNoIndex, for each entry of `MeshTopology::boundary_faces()`.
 VolumeFaceGroups groups_from_boundary(std::vector<Group> groups, const MeshTopology& topology,
                                       std::span<const Index> of_boundary_face);
 
 /// Returns the groups after the vertices have been renumbered. A face is dropped if one of its vertices is (kNoIndex),
 /// or if two of them become one.
 ///
-/// number  new number of each vertex, or kNoIndex.
+/// number  new number of each vertex, or kNoIndex; one entry per vertex of the mesh.
 VolumeFaceGroups renumbered(const VolumeFaceGroups& groups, std::span<const Index> number);
 
 /// Returns the groups without those faces that the mesh does not have.

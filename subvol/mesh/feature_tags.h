@@ -10,7 +10,8 @@ namespace subvol {
 /// Sharpness at and above which a crease or corner never softens (OpenSubdiv's convention).
 inline constexpr double kInfiniteSharpness = 10.0;
 
-/// An edge of the boundary, or of an interface between regions, kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: forever).
+/// An edge of the boundary, or of an interface between regions, kept sharp through `sharpness` refinements (fractions
+/// blend; >= kInfiniteSharpness: forever).
 struct CreaseEdge {
   Index v0, v1;  ///< v0 < v1
   double sharpness = kInfiniteSharpness;
@@ -24,7 +25,8 @@ struct CornerVertex {
   friend bool operator==(const CornerVertex&, const CornerVertex&) = default;
 };
 
-/// Features of a mesh's boundary and of its interfaces. Every edge and vertex occurs at most once; both lists are sorted; sharpness > 0.
+/// Features of a mesh's boundary and of its interfaces. Every edge and vertex occurs at most once; both lists are
+/// sorted; sharpness > 0.
 struct FeatureTags {
   std::vector<CreaseEdge> creases;
   std::vector<CornerVertex> corners;

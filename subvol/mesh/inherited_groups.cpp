@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/inherited_groups.h"
 
+#include "subvol/base/sort_unique.h"
+
 #include <algorithm>
 #include <optional>
 
@@ -56,8 +58,7 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
   for (const GroupedFace& entry : old.faces)
     for (const Index v : entry.face)
       if (v != kNoIndex) smallest_around.emplace_back(v, entry.face[0]);
-  std::sort(smallest_around.begin(), smallest_around.end());
-  smallest_around.erase(std::unique(smallest_around.begin(), smallest_around.end()), smallest_around.end());
+  sort_unique(smallest_around);
   for (std::size_t f = 0; f < refined.num_faces(); ++f) {
     const auto corners = refined.face(static_cast<Index>(f));
     const std::optional<VertexSupport> vertices = union_of(corners, support);

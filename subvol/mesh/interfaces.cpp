@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/interfaces.h"
 
+#include "subvol/base/sort_unique.h"
+
 #include <algorithm>
 
 namespace subvol::internal {
@@ -26,8 +28,7 @@ Interfaces find_interfaces(const VolumeMesh& mesh, const MeshTopology& topology)
     result.faces.push_back(static_cast<Index>(f));
     result.pairs.push_back(pair);
   }
-  std::sort(result.pairs.begin(), result.pairs.end());
-  result.pairs.erase(std::unique(result.pairs.begin(), result.pairs.end()), result.pairs.end());
+  sort_unique(result.pairs);
   for (const Index f : result.faces) {
     const auto at = std::ranges::lower_bound(result.pairs, pair_of(mesh, topology, static_cast<std::size_t>(f)));
     result.pair_of_face.push_back(static_cast<Index>(at - result.pairs.begin()));
@@ -67,8 +68,7 @@ InterfaceMarks mark_interfaces(const MeshTopology& topology, const Interfaces& i
 std::vector<int> region_references(const VolumeMesh& mesh) {
   if (mesh.references.empty()) return {0};
   std::vector<int> references = mesh.references;
-  std::sort(references.begin(), references.end());
-  references.erase(std::unique(references.begin(), references.end()), references.end());
+  sort_unique(references);
   return references;
 }
 

@@ -2,6 +2,7 @@
 #include "subvol/subdivision/audit.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/subdivision/surface_refinement.h"
 #include "subvol/surface/sheets.h"
 #include "subvol/surface/triangle_geometry.h"
@@ -140,12 +141,8 @@ void find_reflex(const VolumeMesh& mesh, const MeshTopology& topology, Subdivisi
     if (!edges.empty()) result.folding_corners.push_back(sheets.vertices[i]);
     for (Index e : edges) result.folding_edges.push_back(topology.edge(sheets.edges[e]));
   }
-  std::sort(result.folding_corners.begin(), result.folding_corners.end());
-  result.folding_corners.erase(std::unique(result.folding_corners.begin(), result.folding_corners.end()),
-                               result.folding_corners.end());
-  std::sort(result.folding_edges.begin(), result.folding_edges.end());
-  result.folding_edges.erase(std::unique(result.folding_edges.begin(), result.folding_edges.end()),
-                             result.folding_edges.end());
+  sort_unique(result.folding_corners);
+  sort_unique(result.folding_edges);
 }
 
 void warn(SubdivisionAudit& result, std::size_t count, const std::string& what) {

@@ -9,14 +9,16 @@
 
 namespace subvol {
 
-/// Configurations of the boundary, and of interfaces between regions, that degrade cells under subdivision, however good the cells are now.
+/// Configurations of the boundary, and of interfaces between regions, that degrade cells under subdivision, however
+/// good the cells are now.
 ///
 /// Edges are pairs of vertices, the smaller first; all lists ascend.
 struct SubdivisionAudit {
   std::size_t num_boundary_edges = 0;
   std::size_t num_interface_edges = 0;  ///< smooth edges of interfaces between regions
-  /// Smooth boundary edges of one cell, and smooth edges of interfaces with one cell on a side: the limit surface is smooth across them, so the cell's angle there tends to 180
-  /// degrees and its smallest scaled Jacobian roughly halves per level. Remedy: a crease, or a layer of cells (pillow).
+  /// Smooth boundary edges of one cell, and smooth edges of interfaces with one cell on a side: the limit surface is
+  /// smooth across them, so the cell's angle there tends to 180 degrees and its smallest scaled Jacobian roughly halves
+  /// per level. Remedy: a crease, or a layer of cells (pillow).
   std::vector<std::array<Index, 2>> flattened_edges;
   /// Creases whose faces enclose more than 180 degrees inside the volume. `CreaseSheets` keeps valid cells valid.
   std::vector<std::array<Index, 2>> reflex_creases;

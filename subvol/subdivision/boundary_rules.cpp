@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -102,4 +102,4 @@ VertexWeights vertex_weights(BoundaryRule rule, float corner_sharpness, std::spa
           parent == Rule::crease ? before.crease_ends : after.crease_ends};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

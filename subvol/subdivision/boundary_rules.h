@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/subdivision/boundary_rule.h"
+
 #include <array>
 #include <span>
 
-namespace subvol {
-
-/// How boundary vertices move when a mesh is refined.
-enum class BoundaryRule {
-  catmull_clark,  ///< rows equal OpenSubdiv's: the boundary is an artist's subdivision surface (default)
-  averaging       ///< the paper's plain multi-linear averaging of the boundary quads
-};
+namespace subvol::internal {
 
 /// Returns the sharpness after one refinement: s - 1, but not below 0; values >= kInfiniteSharpness stay as they are.
 ///
@@ -46,4 +42,4 @@ struct VertexWeights {
 /// rules before and after are blended; the weight of the first is the mean of those sharpnesses, at most 1.
 VertexWeights vertex_weights(BoundaryRule rule, float corner_sharpness, std::span<const float> edge_sharpness);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,7 +15,7 @@ namespace subvol::internal {
 ///   lambda = (5 + c + sqrt((c + 9)(c + 1))) / 16,   c = cos(pi / k)
 ///
 /// while the two boundary faces there have 1/2. For k = 2 it is 1/2, too, but coupled to theirs (a Jordan block): the
-/// interior face that leaves the crease (its *sheet*) turns on and on towards the mean of the boundary faces. For k = 3
+/// interior face that leaves the crease (its *sheet*) turns on and on toward the mean of the boundary faces. For k = 3
 /// it is .5797: the sheets shrink more slowly than the boundary and all turn one way. At a reflex crease both invert
 /// cells, more with every level. Weights >= 0 that couple the sheets are no remedy: if the dominant eigenvalue is 1/2
 /// or less, the sheets become positive combinations of the boundary faces, which lie outside a reflex sector. So the
@@ -31,8 +31,8 @@ namespace subvol::internal {
 /// remains that of OpenSubdiv; inside, the map is only continuous across sheets at the crease. Weights stay >= 0, rows
 /// sum to 1, and lattices are reproduced.
 ///
-/// Interfaces between regions are sheets with rows of their own, like the boundary. Their creases, and the feature curves
-/// at which they end, are treated as those of the boundary are.
+/// Interfaces between regions are sheets with rows of their own, like the boundary. Their creases, and the feature
+/// curves at which they end, are treated as those of the boundary are.
 class CreaseSheets {
  public:
   /// Creases of at least this many cells are treated.

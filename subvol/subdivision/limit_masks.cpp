@@ -184,7 +184,7 @@ std::array<Row, 2> sector_tangents(const Ring& ring, int first, int count, bool 
 
 /// Returns what is left of the smooth tangents after many refinements, scaled back: there is no closed form.
 std::array<Row, 2> dart_tangents(const RingSharpness& sharpness) {
-  constexpr int kRefinements = 24;
+  constexpr int kRefinements = 24;  // by then, only the tangents are left
   std::array<Row, 2> tangents = smooth_tangents({static_cast<int>(sharpness.edges.size())});
   for (Row& tangent : tangents)
     for (int i = 0; i < kRefinements; ++i) tangent = 2 * before_refinement(tangent, sharpness);

@@ -17,7 +17,7 @@ using namespace internal;
 
 namespace {
 
-constexpr int kMaxBoundaryLevels = 8;
+constexpr int kMaxBoundaryLevels = 8;  // of refining: 65536 quads from one
 constexpr BoundaryRule kRule = BoundaryRule::catmull_clark;
 
 /// An edge that leaves a vertex, and the face between it and the next edge; kNoIndex: there is none, at the border.

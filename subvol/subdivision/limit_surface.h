@@ -13,8 +13,8 @@
 
 namespace subvol {
 
-/// Returns the map from control vertices to nodes: vertices of the boundary and of interfaces between regions go to their
-/// positions on the Catmull-Clark limit of these sheets (`tagged_sheets`), other interior vertices stay.
+/// Returns the map from control vertices to nodes: vertices of the boundary and of interfaces between regions go to
+/// their positions on the Catmull-Clark limit of these sheets (`tagged_sheets`), other interior vertices stay.
 ///
 /// Square, num_vertices() rows; rows of a sheet sum to 1 and use vertices of the sheet only. Exact for smooth vertices,
 /// creases, corners, semi-sharp features and darts, next to quads and triangles.
@@ -48,7 +48,7 @@ struct BoundaryRefinement {
 /// with_tangents  fills tangent_u, tangent_v and quad_sites, too.
 ///
 /// Each refined vertex lies exactly on the limit surface (as `limit_map`), so the quads are a tessellation of it.
-/// Cost: about 1 microsecond per refined vertex.
+/// InputError: levels out of range; as `limit_map`. Cost: about 1 microsecond per refined vertex.
 BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents = false);
 
 /// Does the same with the boundary and the interfaces between regions. Each sheet has vertices of its own along the
@@ -58,7 +58,9 @@ BoundaryRefinement refine_sheets(const VolumeMesh& mesh, int levels, bool with_t
 
 /// Returns the outward unit normals of the limit surface at the sites of a refinement with tangents.
 ///
-/// points  positions.apply(control positions). A site whose tangents are parallel gets the mean normal of its quads.
+/// control  positions of the control vertices.
+/// points   positions.apply(control). A site whose tangents are parallel gets the mean normal of its quads.
+/// InputError: a refinement without tangents; arrays of another length.
 std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<const Vec3> control,
                                 std::span<const Vec3> points);
 

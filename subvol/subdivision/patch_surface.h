@@ -18,7 +18,7 @@ namespace subvol {
 ///   (0, 0) ----------- (kUnits, 0)
 class PatchSurface {
  public:
-  static constexpr int kMaxDepth = 14;
+  static constexpr int kMaxDepth = 14;           ///< halvings of a side that parameters can tell apart
   static constexpr int kUnits = 1 << kMaxDepth;  ///< parameters are integers from 0 to kUnits
 
   virtual ~PatchSurface() = default;

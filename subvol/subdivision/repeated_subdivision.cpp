@@ -11,7 +11,7 @@
 namespace subvol::internal {
 namespace {
 
-constexpr int kMostLevels = 8;
+constexpr int kMostLevels = 8;  // 16 million cells from one
 
 // Vertices, edges and faces are numbered with 32 bits, and a hex mesh has about three times as many faces as cells.
 void require_numberable(const VolumeMesh& mesh, int levels) {

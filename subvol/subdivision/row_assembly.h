@@ -78,7 +78,7 @@ class RowBuilder {
 template <class T>
 void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 #ifdef MADV_HUGEPAGE
-  constexpr std::size_t kPage = 4096;
+  constexpr std::size_t kPage = 4096;  // bytes; madvise() asks for whole pages
   void* begin = reserved.data();
   std::size_t size = reserved.capacity() * sizeof(T);
   if (std::align(kPage, kPage, begin, size))
@@ -92,6 +92,7 @@ void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 /// the thread count. Throws what `fill` throws, and std::bad_alloc.
 template <class Fill>
 SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill) {
+  // Number of rows that one thread fills, and of such chunks that are joined at a time.
   constexpr std::size_t kChunkRows = 256, kWaveChunks = 8;
   constexpr std::size_t kExpectedRowSize = 16;  // reserved memory that is not used costs address space only
   struct Chunk {

@@ -43,7 +43,7 @@ SparseMap transposed(const SparseMap& map);
 SparseMap compose(const SparseMap& second, const SparseMap& first);
 /// Returns (1 - t) * a + t * b, entry by entry. The maps have equal shapes, else InputError.
 SparseMap blend(const SparseMap& a, const SparseMap& b, double t);
-/// Returns the given rows of a map, in the given order.
+/// Returns the given rows of a map, in the given order. rows: in range; a row may be there several times.
 SparseMap select_rows(const SparseMap& map, std::span<const Index> rows);
 
 }  // namespace subvol

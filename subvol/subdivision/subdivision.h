@@ -2,7 +2,7 @@
 #pragma once
 
 #include "subvol/mesh/volume_mesh.h"
-#include "subvol/subdivision/boundary_rules.h"
+#include "subvol/subdivision/boundary_rule.h"
 #include "subvol/subdivision/sparse_map.h"
 
 namespace subvol {
@@ -18,8 +18,8 @@ namespace subvol {
 /// sharpness in single precision). Interfaces between regions (cells of different references) are sheets like the
 /// boundary: their rows depend on the interface alone, by the same rules; the feature curves where sheets meet are
 /// infinitely sharp creases, and the points where these meet are corners (sheets.h). Next to creases of two or more
-/// cells, interior rows decouple the faces that leave the crease, so that cells around reflex creases do not invert (see
-/// crease_sheets.h); this changes no boundary row.
+/// cells, interior rows decouple the faces that leave the crease, so that cells around reflex creases do not invert
+/// (see crease_sheets.h); this changes no boundary row.
 /// Cells may still invert if the boundary itself folds or flattens them; see `audit`.
 struct SubdivisionLevel {
   SparseMap matrix;  ///< S: num fine vertices x num control vertices; rows sum to 1

@@ -18,8 +18,8 @@ struct RowTarget {
   double scale = 1;
 };
 
-/// Visits the edges around vertex v, counter-clockwise: visit(i, edge, neighbor, face), where the face lies between edges
-/// i and i + 1. At an open fan, whose first corner must be `vertex_corners[v]`, the last face is kNoIndex.
+/// Visits the edges around vertex v, counter-clockwise: visit(i, edge, neighbor, face), where the face lies between
+/// edges i and i + 1. At an open fan, whose first corner must be `vertex_corners[v]`, the last face is kNoIndex.
 template <class Visit>
 void visit_ring(const SurfaceTopology& surface, Index v, const Visit& visit) {
   const Index start = surface.vertex_corners[v];

@@ -7,7 +7,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kMostListed = 10;
+constexpr std::size_t kMostListed = 10;  // places in a message
 
 }  // namespace
 

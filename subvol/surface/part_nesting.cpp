@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/part_nesting.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 #include "subvol/surface/winding_number.h"
@@ -114,8 +115,7 @@ struct Parts {
       corners.insert(corners.end(), {a, b, c});
       result.emplace_back((mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3);
     }
-    std::sort(corners.begin(), corners.end());
-    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    sort_unique(corners);
     for (const Index v : corners) result.push_back(mesh.positions[v]);
     return result;
   }

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/named_solids.h"
@@ -104,7 +105,7 @@ class RegionFinder {
     double area = 0;
     /// Returns true if the cell encloses more than rounding.
     bool has_volume() const {
-      constexpr double kFlat = 1e-9;
+      constexpr double kFlat = 1e-9;  // of area^(3/2)
       return volume > kFlat * area * std::sqrt(area);
     }
     std::vector<Index> sides;
@@ -189,7 +190,7 @@ class RegionFinder {
 
   /// Finds the cell that each part lies in: the smallest that contains all of some of its points.
   void place_parts() {
-    constexpr std::size_t kMostPoints = 16;
+    constexpr std::size_t kMostPoints = 16;  // of a part, to bound the time
     for (std::size_t around = 0; around < parts_with_cells_.size(); ++around) {
       std::vector<std::size_t> candidates;
       for (std::size_t k = 0; k < parts_with_cells_.size(); ++k)
@@ -226,7 +227,7 @@ class RegionFinder {
   }
 
   void number_regions() {
-    constexpr double kMostly = 0.5;
+    constexpr double kMostly = 0.5;  // share of a part's area
     // Parts that contain others come first.
     std::vector<std::size_t> order(parts_with_cells_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -341,8 +342,8 @@ class RegionFinder {
 
   /// Gives regions the names of groups that bound them.
   static void name_regions(RegionSurface& surface) {
-    constexpr double kMost = 0.5;
-    constexpr double kAll = 1 - 1e-9;
+    constexpr double kMost = 0.5;      // share of a group's area
+    constexpr double kAll = 1 - 1e-9;  // share of a region's area, up to rounding
     const auto& groups = surface.mesh.face_groups;
     if (groups.empty()) return;
     std::vector<double> of_group(groups.groups.size(), 0.0), of_region(surface.regions.size(), 0.0);
@@ -408,8 +409,7 @@ TriangleMesh boundary_of(const RegionSurface& surface, int region, std::span<con
   std::vector<Index> used;
   for (const Index t : triangles)
     used.insert(used.end(), surface.mesh.triangles[t].begin(), surface.mesh.triangles[t].end());
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
+  sort_unique(used);
   TriangleMesh boundary;
   for (const Index v : used) boundary.positions.push_back(surface.mesh.positions[v]);
   for (const Index t : triangles) {
@@ -543,8 +543,7 @@ TriangleMesh inner_surface(const RegionSurface& surface, std::vector<Index>& tri
 std::vector<std::array<int, 2>> region_pairs(const RegionSurface& surface) {
   std::vector<std::array<int, 2>> pairs;
   for (std::size_t t = 0; t < surface.sides.size(); ++t) pairs.push_back(surface.pair(t));
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   return pairs;
 }
 

@@ -42,6 +42,7 @@ enum class RegionRule {
   keep,   ///< whatever is enclosed is a region; there are no voids
   merge   ///< there is one region; sheets inside it do not count, and parts inside others are the walls of voids
 };
+/// Returns the word for a rule in options and reports: "auto", "keep" or "merge".
 const char* to_string(RegionRule rule);
 
 /// Finds the regions that a surface divides space into: the connected components of what is left of space, as far as
@@ -74,8 +75,8 @@ std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRul
 /// references as numbers, and their names; if a reference is not positive, they are numbered from 1 on instead.
 RegionSurface surface_of_regions(const VolumeMesh& mesh);
 
-/// Returns the closed boundary of a region, oriented outward, without groups; and the vertices that it names, in the
-/// surface's order.
+/// Returns the closed boundary of a region, oriented outward, without groups. It has only the vertices that its
+/// triangles name, in the surface's order. It is empty if there is no such region.
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region);
 
 /// Returns the same for each of `RegionSurface::regions`. Cost: almost linear.

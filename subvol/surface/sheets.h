@@ -12,8 +12,8 @@ namespace subvol::internal {
 
 /// What the interfaces of a mesh make of its edges and vertices under subdivision.
 ///
-/// The *sheets* of a mesh are its boundary and its interfaces. They meet along feature curves (`InterfaceMarks`). Where an
-/// interface ends at the boundary, the curve is part of both. Feature curves are refined as
+/// The *sheets* of a mesh are its boundary and its interfaces. They meet along feature curves (`InterfaceMarks`). Where
+/// an interface ends at the boundary, the curve is part of both. Feature curves are refined as
 /// creases of infinite sharpness are. A vertex is a corner, which stays in its place, if
 ///
 ///   - feature curves meet or end there: other than two of their edges do;
@@ -34,13 +34,15 @@ struct SheetFeatures {
   bool is_corner(Index v) const { return !corners.empty() && corners[v] != 0; }
 };
 
-/// Returns the features of a mesh whose boundary is a manifold. topology: of this mesh. Nothing if it has no interfaces.
+/// Returns the features of a mesh whose boundary is a manifold. topology: of this mesh. Nothing if it has no
+/// interfaces.
 /// InputError: two faces of an interface that run the same way along their edge (cells of inconsistent orientation).
 /// Cost: linear.
 SheetFeatures sheet_features(const VolumeMesh& mesh, const MeshTopology& topology);
 
 /// The sheets of a volume mesh as one surface: first its boundary as `tagged_boundary` gives it, with the same numbers;
-/// then its interfaces, cut open along feature curves, with normals that point from the smaller to the larger reference.
+/// then its interfaces, cut open along feature curves, with normals that point from the smaller to the larger
+/// reference.
 ///
 /// A vertex on a feature curve occurs several times, once for each fan of faces around it; so does an edge. The edges
 /// where an interface was cut open are sharp and have one face; `vertex_corners` is the first corner of an open fan,

@@ -30,11 +30,12 @@ struct SolidBoundary {
 
 /// Welds coincident vertices, orients the triangles consistently, closes holes and determines the topology.
 ///
-/// Triangles that share an edge are flipped to agree. A component that lies in an even number of others (`part_nesting`)
-/// bounds a solid, one that lies in an odd number is the wall of a void, whatever its orientation: a solid may float in
-/// a void. Where solids touch along an edge or at a vertex, each has its own: they stay separate components. Holes are
-/// closed by a fan around the mean of their boundary vertices, as if they were disks. Triangles with two equal corners,
-/// and those without a neighbor, are dropped. Triangles keep their groups; those that close holes are in none.
+/// Triangles that share an edge are flipped to agree. A component that lies in an even number of others
+/// (`part_nesting`) bounds a solid, one that lies in an odd number is the wall of a void, whatever its orientation: a
+/// solid may float in a void. Where solids touch along an edge or at a vertex, each has its own: they stay separate
+/// components. Holes are closed by a fan around the mean of their boundary vertices, as if they were disks. Triangles
+/// with two equal corners, and those without a neighbor, are dropped. Triangles keep their groups; those that close
+/// holes are in none.
 ///
 /// InputError: a vertex number out of range, a position that is not finite, no triangles that share an edge; an edge of
 /// more than two triangles that are not those of solids that touch there (`pair_around_edge`), with the number of such

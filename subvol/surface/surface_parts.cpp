@@ -2,6 +2,7 @@
 #include "subvol/surface/surface_parts.h"
 
 #include "subvol/base/disjoint_sets.h"
+#include "subvol/base/sort_unique.h"
 
 #include <algorithm>
 #include <array>
@@ -113,8 +114,7 @@ std::vector<std::array<Index, 2>> edge_contacts(const SurfaceParts& parts) {
   for (const auto* edges : {&parts.touching, &parts.crowded})
     for (const std::size_t first : *edges)
       for (const auto& pair : contacts_at_edge(parts.surface.mesh, parts.edge(first))) contacts.push_back(pair);
-  std::sort(contacts.begin(), contacts.end());
-  contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+  sort_unique(contacts);
   return contacts;
 }
 

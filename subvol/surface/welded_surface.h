@@ -75,8 +75,8 @@ std::vector<std::array<Index, 2>> contacts_at_edge(const TriangleMesh& mesh, std
 
 /// Pairs the sides at an edge of more than two triangles, such that solids that only touch there stay apart.
 ///
-/// The triangles are sorted by their angle around the edge. Each one that runs forward is paired with the one across the
-/// wedge of solid behind it.
+/// The triangles are sorted by their angle around the edge. Each one that runs forward is paired with the one across
+/// the wedge of solid behind it.
 ///
 /// sides     the sides of one edge.
 /// outward   true if the triangles' normals point out of the solid, false if they point into it.

@@ -16,7 +16,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr Index kLeafSize = 8;
+constexpr Index kLeafSize = 8;  // triangles
 // A node is taken as a whole from a distance of this many radii on: the third moments, which are left out, then add
 // less than 0.01 in total.
 constexpr double kFarRadii = 2.2;
@@ -32,7 +32,7 @@ class SolidAngles {
   void add(const Vec3& a, const Vec3& b, const Vec3& c) {
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
     const double y = a.dot(b.cross(c)), x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    constexpr double kRounding = 1e-15;
+    constexpr double kRounding = 1e-15;                     // of the product of the lengths
     if (!(std::abs(y) > kRounding * la * lb * lc)) return;  // seen from its own plane: no angle
     const double length = std::abs(x) + std::abs(y);
     const std::complex<double> before = product_, factor(x / length, y / length);

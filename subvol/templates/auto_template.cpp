@@ -131,6 +131,7 @@ class Search {
 
 /// Cell size for which the inner cells of a grid and a layer around them add up to the requested count.
 double Search::pillowed_size(const Frame& frame) const {
+  // The size is found to 0.14 %. kLines lines along each edge of a cell's face estimate its fraction.
   constexpr int kHalvings = 10, kLines = 3;
   const double plain = std::cbrt(solid_.volume / cells_);
   double low = plain, high = 4 * plain;
@@ -163,6 +164,8 @@ std::vector<Placement> Search::placements() const {
 std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
                                          std::size_t& num_right) const {
   constexpr int kLinesOfCell = 4;  // as by default
+  // Least fraction of a cell that belongs to the solid. Counts cost |log(share of the count asked for)| times
+  // kCountWeight, apart from the first kFreeCount.
   constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
   constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
   Candidate best{frame, std::move(grid), {}, 0, 0};
@@ -238,7 +241,7 @@ class SizeSearch {
 
 std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double most_cells,
                                               AutoTemplateResult& result) const {
-  constexpr int kGrids = 5;
+  constexpr int kGrids = 5;               // grids of different sizes at most
   constexpr double kLeastAligned = 0.03;  // share of the area on planes below which these are no help
   constexpr ShareRange kNear{0.8, 1.25}, kAccepted{kLeastShareThroughPlanes, kMostShareThroughPlanes};
   std::optional<Candidate> best;

@@ -11,6 +11,7 @@
 
 namespace subvol {
 
+/// Options of `auto_templates`.
 struct AutoTemplateOptions {
   std::size_t cells = 300;      ///< approximate number, in [kLeastTemplateCells, kMostTemplateCells]
   bool pillow = false;          ///< adds a layer of cells inside the whole boundary; they count toward `cells`
@@ -44,6 +45,7 @@ struct AutoTemplate {
   double aligned_share = 0;     ///< share of the surface's area on planes through `lines`, in [0, 1]
 };
 
+/// The templates that were found, and how many were looked at.
 struct AutoTemplateResult {
   std::vector<AutoTemplate> templates;  ///< best first, no two from one grid; empty if cancelled or none was found
   BettiNumbers wanted;                  ///< topology of the surface's solid
@@ -79,7 +81,7 @@ struct AutoTemplateResult {
 /// numbers of cells and triangles.
 AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {},
                                   std::size_t most = 1);
-/// As above, for a solid of which the boundary is known, if several templates are made for it.
+/// Does the same for a solid whose boundary is known, which saves time if several templates are made for it.
 AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplateOptions& options = {},
                                   std::size_t most = 1);
 

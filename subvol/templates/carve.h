@@ -22,7 +22,8 @@ VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t ce
 ///
 /// The share of a cell is the fraction of 27 sample points at which the generalized winding number (`WindingNumber`)
 /// exceeds 1/2; so the surface may have holes.
-/// least_share  in (0, 1], else InputError. InputError also as `WindingNumber`.
+/// least_share  in (0, 1], else InputError. InputError: also for a surface without triangles, with a vertex number out
+///              of range or with a position that is not finite.
 std::vector<char> cells_inside(const VolumeMesh& mesh, const TriangleMesh& surface, double least_share = 0.5);
 
 /// Marks the cells whose center (mean of the corners) lies in a closed box.

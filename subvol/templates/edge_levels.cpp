@@ -73,7 +73,7 @@ class LevelChoice {
   /// Returns all of some items, or some hundreds that are evenly spread: each is compared with all edges of a level.
   template <class Item>
   static std::vector<Item> sample(const std::vector<Item>& items) {
-    constexpr std::size_t kMost = 300;
+    constexpr std::size_t kMost = 300;  // items
     const std::size_t step = std::max<std::size_t>(1, items.size() / kMost);
     std::vector<Item> some;
     for (std::size_t i = 0; i < items.size(); i += step) some.push_back(items[i]);

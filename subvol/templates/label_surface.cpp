@@ -5,6 +5,7 @@
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_labels.h"
 
@@ -44,8 +45,7 @@ class LabelSheets {
     if (!can_number_voxels(grid.counts))
       throw InputError("segmentation: it has more than 2^31 - 1 voxels, those of the empty layers around it included");
     values_ = grid.labels;
-    std::sort(values_.begin(), values_.end());
-    values_.erase(std::unique(values_.begin(), values_.end()), values_.end());
+    sort_unique(values_);
     std::erase(values_, kOutside);
     if (values_.empty()) throw InputError("segmentation: no voxel has a label above 0");
   }
@@ -114,8 +114,7 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
   for (int label = 0; label <= labels.num_regions() && !stop_.is_stopped(); ++label) {
     std::vector<int>& of_this = of_label[label];
     for (int& c : of_this) c = sets.of(c);
-    std::sort(of_this.begin(), of_this.end());
-    of_this.erase(std::unique(of_this.begin(), of_this.end()), of_this.end());
+    sort_unique(of_this);
     if (keeps_regions && label != kOutside && !of_this.empty()) {
       const auto largest =
           std::max_element(of_this.begin(), of_this.end(), [&](int a, int b) { return size[a] < size[b]; });
@@ -143,7 +142,7 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
 }
 
 VoxelLabels LabelSheets::cleaned() {
-  constexpr int kRounds = 4;
+  constexpr int kRounds = 4;  // making points good may leave specks, and dropping these may make points bad
   const auto [nx, ny, nz] = grid_.counts;
   VoxelLabels labels({nx + 2 * kRim, ny + 2 * kRim, nz + 2 * kRim}, static_cast<int>(values_.size()),
                      VertexRule::manifold);
@@ -159,7 +158,7 @@ VoxelLabels LabelSheets::cleaned() {
         labels.set(c, given[c]);
       }
   const auto share = [&](int label, Index cell) {  // a voxel is much more its own label than that of a neighbor
-    constexpr double kNeighbor = 0.5 / 26;
+    constexpr double kNeighbor = 0.5 / 26;         // half of the share, for each of the 26 neighbors
     double sum = given[cell] == label ? 0.5 : 0;
     for (const Index offset : labels.all_offsets()) sum += given[cell + offset] == label ? kNeighbor : 0;
     return sum;
@@ -312,7 +311,7 @@ std::vector<double> LabelSheets::volumes() const {
 /// Moves each sheet along its normals: of all moves that give the regions their volumes to first order, the one with
 /// the least integral of its square.
 void LabelSheets::restore_volumes() {
-  constexpr int kRounds = 8;
+  constexpr int kRounds = 8;                         // Newton steps at most; they end at kEnough
   constexpr double kEnough = 1e-5, kMostStep = 0.3;  // relative; voxels
   std::map<std::array<int, 2>, Index> sheet_of_pair;
   for (const Face& face : faces_) sheet_of_pair.try_emplace(face.pair, 0);

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
@@ -126,7 +127,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
 /// origins  numbers of all vertices for the message.
 void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps,
                    std::span<const Index> origins) {
-  constexpr int kRounds = 20;
+  constexpr int kRounds = 20;  // 1e-6 of a step is none
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < number.size(); ++v)
     if (number[v] != kNoIndex) old[number[v]] = static_cast<Index>(v);
@@ -177,12 +178,6 @@ using EdgeKey = std::array<Index, 2>;
 EdgeKey edge_key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
 template <class Key>
-void sort_keys(std::vector<Key>& keys) {
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-}
-
-template <class Key>
 bool has_key(const std::vector<Key>& sorted, const Key& key) {
   return std::binary_search(sorted.begin(), sorted.end(), key);
 }
@@ -198,8 +193,8 @@ struct LayerKeys {
       for (std::size_t i = 0; i < face.size; ++i)
         edges.push_back(edge_key(face.corners[i], face.corners[(i + 1) % face.size]));
     }
-    sort_keys(faces);
-    sort_keys(edges);
+    sort_unique(faces);
+    sort_unique(edges);
   }
 };
 
@@ -246,7 +241,7 @@ void carry_inner_creases(const VolumeMesh& mesh, std::span<const char> in_set, c
     for (int e = 0; e < local.num_edges; ++e)
       edges.push_back(edge_key(mesh.cell(c)[local.edges[e][0]], mesh.cell(c)[local.edges[e][1]]));
   }
-  sort_keys(edges);
+  sort_unique(edges);
   bool changed = false;
   std::vector<CreaseEdge> through;
   for (CreaseEdge& crease : result.tags.creases) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/plane_grid.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/template_frames.h"
 
@@ -158,8 +159,7 @@ class PlaneSamples {
     std::vector<Point> points;
     for (Index t : plane.triangles)
       if ((area_vector(surface_, surface_.triangles[t]).dot(normal_) > 0) == up) add(surface_.triangles[t], points);
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
+    sort_unique(points);
     return points;
   }
 

@@ -28,7 +28,7 @@ using HexPlaces = std::array<Place, 8>;
 /// Marked corners of a hex, one bit each.
 using Marks = std::uint8_t;
 
-constexpr int kWhole = 6;
+constexpr int kWhole = 6;  // of an edge, whose halves and thirds are whole numbers then
 
 constexpr std::array<Place, 8> kCorners = {
     {{0, 0, 0}, {6, 0, 0}, {6, 6, 0}, {0, 6, 0}, {0, 0, 6}, {6, 0, 6}, {6, 6, 6}, {0, 6, 6}}};

@@ -42,8 +42,10 @@ struct LocalRefinement {
   std::vector<Index> parents;  ///< for each cell, the cell that it is a part of, or was
 };
 
-/// As `refine_at`, with the parents of the cells. Parts that are inverted are no error if they are to be kept. The mesh
-/// may touch itself at edges and vertices.
+/// Does the same as `refine_at`, and returns the parents of the cells. The mesh may touch itself at edges and vertices.
+///
+/// warped  kept: a part that is inverted is no error.
+/// InputError: as `refine_at`.
 LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped);
 
 /// Marks all vertices of the chosen cells, as `refine_at` expects them: those cells are cut into 27. chosen: one entry

@@ -129,7 +129,7 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
 
 /// Returns the shares of each cell that lie outside and in each region; incomplete if the search was stopped.
 LabelFractions RegionSearch::fractions_in(const VoxelGrid& grid) {
-  constexpr int kLinesOfCell = 4;
+  constexpr int kLinesOfCell = 4;  // along each edge of a cell's face; they estimate its fractions
   const auto num_regions = static_cast<int>(surface_.regions.size());
   LabelFractions fractions(static_cast<std::size_t>(num_regions) + 1);
   ParallelErrors errors;
@@ -147,7 +147,7 @@ LabelFractions RegionSearch::fractions_in(const VoxelGrid& grid) {
 
 /// Labels a grid. Returns nothing if its regions cannot be made right.
 std::optional<LabeledGrid> RegionSearch::labeled(VoxelGrid grid, double cells, bool is_exact) {
-  constexpr int kWeightRounds = 5;
+  constexpr int kWeightRounds = 5;  // of changing the weights of regions that came out too small or too large
   ++num_grids_;
   const LabelFractions fractions = fractions_in(grid);
   std::vector<double> weights(fractions.size(), 1.0);
@@ -232,7 +232,9 @@ bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_len
 }
 
 std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
-  constexpr int kGrids = 5;
+  constexpr int kGrids = 5;  // grids of different sizes at most
+  // Counts between kLeast and kMost times the one asked for are near it. A grid without right regions makes the next
+  // size finer, one without room for planes coarser. No size changes as if counts were off by more than kBelieved.
   constexpr double kLeast = 0.6, kMost = 1.25, kFiner = 0.85, kCoarser = 1.25, kBelieved = 8;
   std::optional<LabeledGrid> best;
   double size = size_for(cells, options_.for_pillow), finer = 0, coarser = 0;
@@ -265,8 +267,8 @@ std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, 
 }
 
 std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
-  constexpr double kMost = 1.25;
-  constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
+  constexpr double kMost = 1.25;  // share of the count asked for, or its inverse, beyond which the size is corrected
+  constexpr std::array<double, 3> kCubeSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
   const auto labeled_cubes = [&](const Mat3& frame, double size, double offset) -> std::optional<LabeledGrid> {
@@ -276,7 +278,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   };
   double size = size_for(cells, options_.for_pillow);
   std::optional<LabeledGrid> best;
-  for (const double factor : kSizes)
+  for (const double factor : kCubeSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
@@ -288,7 +290,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
           if (found) size = corrected;
         }
         if (found && (!best || is_better(*found, *best))) best = std::move(found);
-        if (best && best->wrong_sheets == 0 && factor != kSizes.front()) return best;
+        if (best && best->wrong_sheets == 0 && factor != kCubeSizes.front()) return best;
       }
   return best;
 }

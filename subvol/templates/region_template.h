@@ -12,6 +12,7 @@
 
 namespace subvol {
 
+/// Options of `region_template`.
 struct RegionTemplateOptions {
   std::size_t cells = 300;  ///< approximate number, in [kLeastTemplateCells, kMostTemplateCells]
   /// Layers are to be put on the sheets of the grid: `pillow_regions` can do so, and the cells that it would add count
@@ -31,6 +32,7 @@ struct RegionTemplate {
   std::size_t wrong_sheets = 0;  ///< interfaces and parts of the boundary whose topology is not that of the surface
 };
 
+/// The template, or what kept it from being found.
 struct RegionTemplateResult {
   std::optional<RegionTemplate> made;  ///< empty if cancelled or none was found
   std::vector<Index> missed;           ///< places in `RegionSurface::regions` of those that were wrong most often
@@ -48,7 +50,8 @@ struct RegionTemplateResult {
 /// planes of the surface if there are any (`lines_through_planes`).
 ///
 /// If no grid with the requested count works, counts up to 9 times as large are tried.
-/// InputError: options out of range; as `topology_of`; regions so far apart, or so thin, that every grid is too large.
+/// InputError: options out of range; a region whose boundary bounds no solid (`solid_boundary`); regions so far apart,
+/// or so thin, that every grid is too large.
 /// Deterministic; serial but for the shares of regions.
 RegionTemplateResult region_template(const RegionSurface& surface, const RegionTemplateOptions& options = {});
 

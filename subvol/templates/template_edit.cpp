@@ -10,9 +10,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace subvol {
-
-using namespace internal;
+namespace subvol::internal {
 
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell) {
   const CellTopology& topology = cell_topology(mesh.kinds[cell]);
@@ -76,4 +74,4 @@ VolumeMesh kept_cells(const VolumeMesh& mesh, std::span<const char> kept) {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

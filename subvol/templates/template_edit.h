@@ -6,14 +6,15 @@
 #include <span>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
-/// Helpers shared by the operations that edit templates.
+// Helpers of the operations that edit templates.
 
-/// True if det[n0-c, n1-c, n2-c] > 0 at every corner c of a cell, with neighbors n0, n1, n2.
+/// Returns true if det[n0-c, n1-c, n2-c] > 0 at every corner c of a cell, with neighbors n0, n1, n2. The apex of a
+/// pyramid does not count.
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell);
 
-/// Group number of a cell; 0 if the mesh has none.
+/// Returns the reference of a cell; 0 if the mesh has no references.
 inline int reference_of(const VolumeMesh& mesh, std::size_t cell) {
   return mesh.references.empty() ? 0 : mesh.references[cell];
 }
@@ -29,4 +30,4 @@ void drop_lost_tags(VolumeMesh& mesh);
 /// whose ends are the same vertex.
 void normalize_tags(FeatureTags& tags);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/base/sort_unique.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
@@ -65,8 +66,7 @@ std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<
   for (int f = 0; f < hex.num_faces; ++f)
     if (reduced_face(hex, f, corners).size() == 3) triangles.push_back(f);
   Corners distinct(corners.begin(), corners.end());
-  std::sort(distinct.begin(), distinct.end());
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  sort_unique(distinct);
   if (distinct.size() != 6 || triangles.size() != 2) return std::nullopt;
   std::array<Index, 6> prism{};
   std::size_t n = 0;
@@ -98,8 +98,7 @@ VolumeFaceGroups merged_groups(const VolumeFaceGroups& groups, std::span<const I
     Corners corners;
     for (const Index v : entry.face)
       if (v != kNoIndex) corners.push_back(target[v]);
-    std::sort(corners.begin(), corners.end());
-    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    sort_unique(corners);
     if (corners.size() >= 3) merged.faces.push_back({face_key(corners), entry.group});
   }
   normalize(merged);

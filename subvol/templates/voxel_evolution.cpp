@@ -238,7 +238,8 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
 }
 
 void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
-  constexpr double kLeastFraction = 0.02;
+  constexpr double kLeastFraction = 0.02;  // of a cell; less does not belong to a part that must be reached
+  // Steps from the solid that are near enough, and rounds: one part that is reached may lead to the next.
   constexpr int kNear = 2, kRounds = 3;
   std::vector<char> given_up(solid.num_cells(), 0);
   std::vector<Index> previous, path, far;

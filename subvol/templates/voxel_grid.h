@@ -64,7 +64,8 @@ VoxelGrid grid_through(const Mat3& frame, std::array<std::vector<double>, 3> lin
 /// Returns the volume of each cell, in units of the volume that the edge vectors span; empty if all cells are equal.
 std::vector<double> cell_volumes(const VoxelGrid& grid);
 
-/// Low and high corners of the box around a surface's triangles, moved outward by `margin_percent` % of its diagonal.
+/// Returns the low and high corners of the box around a surface's triangles, moved outward by `margin_percent` % of its
+/// diagonal.
 std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percent);
 
 /// Returns the kept cells as hexes, in the grid's order, and the lattice points that they use, in lattice order.

@@ -291,7 +291,7 @@ bool make_points_good(VoxelLabels& labels, const std::function<double(int label,
 
 bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::span<const double> weights,
                    const RegionTopology& wanted, int voids, SearchStop* stop) {
-  constexpr int kRounds = 4;
+  constexpr int kRounds = 4;  // making points good may leave surplus parts, and dropping these may make points bad
   for (std::size_t i = 0; i < labels.num_cells(); ++i) {
     constexpr std::size_t kBetween = 64;  // cells: there may be thousands of regions
     if (i % kBetween == 0 && is_stopped(stop)) return false;
@@ -322,7 +322,7 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
 }
 
 void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* stop) {
-  constexpr int kMostChanges = 2;
+  constexpr int kMostChanges = 2;                // of a voxel, so that the evolution ends
   using Entry = std::tuple<double, Index, int>;  // gain, cell, label
   const auto less = [](const Entry& a, const Entry& b) {
     if (std::get<0>(a) != std::get<0>(b)) return std::get<0>(a) < std::get<0>(b);

@@ -11,7 +11,9 @@ namespace subvol::internal {
 
 namespace {
 
+/// Fractions of a cell from which on it must not be far from the solid, and from which on the solid may be near it.
 constexpr double kInShape = 0.02, kMostlyInShape = 0.3;
+/// Weight of the farthest cells, in steps, beside the relative volume of wrong cells.
 constexpr double kExtremeWeight = 0.15;
 
 }  // namespace

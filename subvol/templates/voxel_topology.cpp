@@ -8,7 +8,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kElements = 27;
+constexpr int kElements = 27;  // cells of a neighborhood of 3 x 3 x 3
 
 /// True if the octants of a set are connected through faces; also true for the empty set.
 constexpr bool face_connected(unsigned octants) {

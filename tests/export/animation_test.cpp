@@ -29,7 +29,7 @@ const samples::Sample& ball() {
 
 FitResult short_fit(bool keep_states) {
   return fit_subdivision_volume(ball().target, ball().template_mesh,
-                                {.levels = 2, .max_iterations = 3, .keep_states = keep_states});
+                                {.levels = 2, .control = {.max_iterations = 3}, .keep_states = keep_states});
 }
 
 /// Largest distance of positions from the unit sphere's neighborhood, as a share.
@@ -85,8 +85,8 @@ TEST_CASE("the animation of a fit goes from the template's limit surface to the 
 
 TEST_CASE("a fit of curved cells is animated as well", "[animation][slow]") {
   const TemporaryFolder folder;
-  const HighOrderFitResult fit =
-      fit_high_order(ball().target, ball().template_mesh, {.order = 3, .max_iterations = 3, .keep_states = true});
+  const HighOrderFitResult fit = fit_high_order(ball().target, ball().template_mesh,
+                                                {.order = 3, .control = {.max_iterations = 3}, .keep_states = true});
   REQUIRE(fit.states.size() >= 2);
   CHECK(fit.states[0].name == "template");
   for (const FitState& state : fit.states) REQUIRE(state.positions.size() == fit.mesh.coefficients.size());

@@ -6,9 +6,9 @@
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <limits>
 #include <map>
@@ -227,12 +227,11 @@ TEST_CASE("the wireframe runs along quad edges, once over every cage edge") {
 
 TEST_CASE("a tessellation is the same bits for one thread and two") {
   const VolumeMesh cage = bumpy();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const TessellatedSurface one = tessellate(cage, 0.003);
-  omp_set_num_threads(2);
+  guard.use(2);
   const TessellatedSurface two = tessellate(cage, 0.003);
-  omp_set_num_threads(before);
   CHECK(one.positions == two.positions);
   CHECK(one.normals == two.normals);
   CHECK(one.quads == two.quads);

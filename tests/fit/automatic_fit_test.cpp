@@ -199,7 +199,7 @@ TEST_CASE("The template of a cage is subdivided as often as asked for", "[slow]"
 
 TEST_CASE("An automatic fit with a cage that ends early has a cage") {
   AutomaticFitOptions options{.cells = 3000, .makes_cage = true};
-  options.progress = [](const FitProgress& progress) { return std::string(progress.stage) == "template"; };
+  options.control.progress = [](const FitProgress& progress) { return std::string(progress.stage) == "template"; };
   const AutomaticFitResult result = fit_automatically(test::cube_surface(6, true), options);
   REQUIRE(result.mesh.num_cells() > 0);
   CHECK(result.mesh.num_cells() == 8 * result.cage.num_cells());
@@ -209,17 +209,17 @@ TEST_CASE("An automatic fit that ends early gives what it has, or nothing") {
   const TriangleMesh ball = test::cube_surface(6, true);
   AutomaticFitOptions options{.cells = 1000};
   int calls = 0;
-  options.progress = [&](const FitProgress& progress) {
+  options.control.progress = [&](const FitProgress& progress) {
     if (progress.level == 1) ++calls;
     return calls < 3;
   };
   const AutomaticFitResult cut = fit_automatically(ball, options);
   CHECK(cut.report.stop_reason == StopReason::cancelled);
   CHECK(check_mesh(cut.mesh, &ball, {}).valid());
-  options.progress = [](const FitProgress&) { return false; };
+  options.control.progress = [](const FitProgress&) { return false; };
   CHECK(fit_automatically(ball, options).mesh.num_cells() == 0);
-  options.progress = {};
-  options.time_limit_seconds = 1e-6;
+  options.control.progress = {};
+  options.control.time_limit_seconds = 1e-6;
   CHECK(fit_automatically(ball, options).report.stop_reason == StopReason::time_limit);
 }
 
@@ -230,7 +230,7 @@ TEST_CASE("An automatic fit says that it was canceled, wherever that was", "[slo
   AutomaticFitOptions options{.cells = 400, .quality = kMostQuality, .crease_angle_degrees = angle};
   std::atomic<int> questions = 0;
   int most = std::numeric_limits<int>::max();
-  options.cancelled = [&] { return ++questions > most; };
+  options.control.cancelled = [&] { return ++questions > most; };
   fit_automatically(target, options);
   const int all = questions;
   REQUIRE(all > 20);

@@ -120,7 +120,7 @@ bool has(const std::vector<std::string>& warnings, const std::string& words) {
 
 TEST_CASE("A damaged target is fitted nearly as well as a clean one, with certified cells", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
-  const FitOptions options{.levels = 1, .quality = 0, .max_iterations = 6};
+  const FitOptions options{.levels = 1, .quality = 0, .control = {.max_iterations = 6}};
   const double clean =
       check_mesh(fit_subdivision_volume(sample.target, sample.template_mesh, options).mesh, &sample.target)
           .mean_distance_percent();
@@ -137,7 +137,7 @@ TEST_CASE("A damaged target is fitted nearly as well as a clean one, with certif
 
 TEST_CASE("Curved elements are fitted to damaged targets as well", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
-  const HighOrderFitOptions options{.order = 2, .max_iterations = 6};
+  const HighOrderFitOptions options{.order = 2, .control = {.max_iterations = 6}};
   const auto distance = [&](const TriangleMesh& target) {
     const HighOrderMesh mesh = fit_high_order(target, sample.template_mesh, options).mesh;
     CHECK(measure_quality(mesh).inverted_cells == 0);
@@ -159,7 +159,8 @@ TEST_CASE("What is odd about a target is said, what does not matter to it is not
   const auto warnings = [&](void (*apply)(TriangleMesh&)) {
     TriangleMesh target = sample.target;
     apply(target);
-    return fit_subdivision_volume(target, sample.template_mesh, {.levels = 1, .max_iterations = 1}).report.warnings;
+    return fit_subdivision_volume(target, sample.template_mesh, {.levels = 1, .control = {.max_iterations = 1}})
+        .report.warnings;
   };
   CHECK(!has(warnings([](TriangleMesh&) {}), "target: "));
   CHECK(!has(warnings(tear), "target: "));
@@ -173,7 +174,7 @@ TEST_CASE("What is odd about a target is said, what does not matter to it is not
 TEST_CASE("A template of another topology than its target's is warned of where the target is closed", "[slow]") {
   const samples::Sample ball = samples::ball_sample(), torus = samples::torus_sample();
   const auto report = [](const TriangleMesh& target, const VolumeMesh& mesh) {
-    return fit_subdivision_volume(target, mesh, {.levels = 1, .max_iterations = 1}).report;
+    return fit_subdivision_volume(target, mesh, {.levels = 1, .control = {.max_iterations = 1}}).report;
   };
   const FitReport other = report(torus.target, ball.template_mesh);
   CHECK(has(other.warnings, "topology differs"));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/high_order_fit.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/surface_distance.h"
-#include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/io/mesh_io.h"
@@ -16,9 +16,9 @@
 #include "tests/support/feature_fixtures.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -93,7 +93,7 @@ TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says th
 TEST_CASE("a high-order fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   HighOrderFitOptions options = of_order(2);
-  options.max_iterations = 1;
+  options.control.max_iterations = 1;
   options.improve_worst_places = false;
   CHECK(fit_high_order(sample.target, sample.template_mesh, options).report.stop_reason == StopReason::iteration_limit);
   const FitReport inverted = fit_high_order(sample.target, hex_inverted_inside(), of_order(2)).report;
@@ -215,13 +215,12 @@ TEST_CASE("curved elements keep sharp edges if they are asked to, or if the temp
 
 TEST_CASE("a high-order fit has the same bits for one and two threads", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
-  const int threads = omp_get_max_threads();
+  test::ThreadGuard guard;
   std::vector<std::vector<Vec3>> results;
   for (int n : {1, 2}) {
-    omp_set_num_threads(n);
+    guard.use(n);
     results.push_back(fit_high_order(sample.target, sample.template_mesh, of_order(2)).mesh.coefficients);
   }
-  omp_set_num_threads(threads);
   CHECK(results[0] == results[1]);
 }
 
@@ -240,7 +239,7 @@ TEST_CASE("a high-order fit that is cancelled returns what it has") {
   const samples::Sample sample = samples::ball_sample();
   HighOrderFitOptions options = of_order(4);
   int told = 0;
-  options.progress = [&](const FitProgress& progress) {
+  options.control.progress = [&](const FitProgress& progress) {
     CHECK((progress.fraction >= 0 && progress.fraction <= 1));
     return ++told < 5;
   };
@@ -255,7 +254,7 @@ TEST_CASE("a high-order fit at its time limit keeps no boundary that intersects 
   if (!data) return;
   const TriangleMesh target = read_triangle_mesh(*data / "fit" / "far_asm122" / "target.off");
   HighOrderFitOptions options = of_order(4);
-  options.time_limit_seconds = 12;  // at order 4, its boundary is folded then
+  options.control.time_limit_seconds = 12;  // at order 4, its boundary is folded then
   const HighOrderFitResult result =
       fit_high_order(target, read_volume_mesh(*data / "fit" / "far_asm122" / "template.mesh"), options);
   CHECK(result.report.stop_reason == StopReason::time_limit);

@@ -133,11 +133,11 @@ TEST_CASE("keep_groups: a second fit follows borders if the first one misses gro
   const auto run = [&](const AutomaticFitResult& without, const AutomaticFitResult& with, double limit = 0) {
     asked.clear();
     AutomaticFitOptions options;
-    options.time_limit_seconds = limit;
+    options.control.time_limit_seconds = limit;
     return fit_for_groups(sphere, options, [&](bool follows_borders, const AutomaticFitOptions& given) {
       asked.push_back(follows_borders);
       CHECK(given.keeps_groups == follows_borders);
-      time_limit = given.time_limit_seconds;
+      time_limit = given.control.time_limit_seconds;
       return follows_borders ? with : without;
     });
   };

@@ -142,7 +142,7 @@ TEST_CASE("a solid inside another one is not valid, one in its cavity is", "[mes
   CHECK(check_mesh(hollow, nullptr, {}).valid());
 }
 
-TEST_CASE("distances to a target are told in length and in per cent of the target's diagonal", "[mesh_check]") {
+TEST_CASE("distances to a target are told in length and in percent of the target's diagonal", "[mesh_check]") {
   const VolumeMesh mesh = lattice(1, 1, 1);
   TriangleMesh target = boundary_triangles(mesh);
   for (Vec3& p : target.positions) p = Vec3(0.5, 0.5, 0.5) + 1.2 * (p - Vec3(0.5, 0.5, 0.5));

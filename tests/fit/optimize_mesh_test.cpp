@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/optimize_mesh.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/mesh_check.h"
-#include "subvol/fit/optimize_mesh.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <random>
@@ -245,16 +245,15 @@ TEST_CASE("Optimization draws the boundary to a target, and keeps references and
 
 TEST_CASE("Optimization gives the same bits for any number of threads, and can be cancelled") {
   const VolumeMesh start = scrambled(test::lattice(4, 4, 4), 4, 9);
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const OptimizeResult one = optimize_mesh(start, nullptr, {});
-  omp_set_num_threads(4);
+  guard.use(4);
   const OptimizeResult four = optimize_mesh(start, nullptr, {});
-  omp_set_num_threads(threads);
   CHECK(one.mesh.positions == four.mesh.positions);
 
   const OptimizeResult cancelled =
-      optimize_mesh(start, nullptr, {.progress = [](const FitProgress&) { return false; }});
+      optimize_mesh(start, nullptr, {.control = {.progress = [](const FitProgress&) { return false; }}});
   CHECK(cancelled.report.stop_reason == StopReason::cancelled);
   CHECK(cancelled.report.stages.back().mean_distance_percent < 0);  // nobody goes on from there: not measured
   CHECK(cancelled.uncertified == certify(cancelled.mesh).not_certified);

@@ -15,9 +15,9 @@
 #include "subvol/io/surface_io.h"
 #include "tests/support/surface_fixtures.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <cmath>
 #include <numbers>
@@ -113,12 +113,11 @@ TEST_CASE("By area, a dense part of a cloud weighs no more than a sparse one") {
 
 TEST_CASE("A cloud's geometry has the same bits for one and two threads, and refuses what has none") {
   const PointCloud cloud = on_sphere(3000);
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const CloudGeometry one = cloud_geometry(cloud.points);
-  omp_set_num_threads(2);
+  guard.use(2);
   const CloudGeometry two = cloud_geometry(cloud.points);
-  omp_set_num_threads(threads);
   CHECK(one.normals == two.normals);
   CHECK(one.areas == two.areas);
   CHECK_THROWS_AS(cloud_geometry(std::vector{Vec3(0, 0, 0)}), InputError);
@@ -218,13 +217,12 @@ TEST_CASE("Curved elements follow points, and noise is averaged out", "[slow]") 
 TEST_CASE("Fits to points are the same bits for one and two threads, and as good far from the origin", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const PointCloud cloud = samples::scattered_points(sample.target, 1000);
-  const int threads = omp_get_max_threads();
+  test::ThreadGuard guard;
   std::vector<VolumeMesh> results;
   for (int n : {1, 2}) {
-    omp_set_num_threads(n);
+    guard.use(n);
     results.push_back(fit_subdivision_volume(cloud, sample.template_mesh, {.levels = 1}).mesh);
   }
-  omp_set_num_threads(threads);
   CHECK(results[0].positions == results[1].positions);
   const Vec3 far(1e4, -2e4, 3e3);
   PointCloud moved_cloud = cloud;

@@ -19,9 +19,9 @@
 
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +32,7 @@ using namespace subvol::test;
 
 namespace {
 
-/// Mean distance of a mesh's boundary, or of a cage's limit surface, to the target, in per cent of the diagonal.
+/// Mean distance of a mesh's boundary, or of a cage's limit surface, to the target, in percent of the diagonal.
 double mesh_percent(const VolumeMesh& mesh, const TriangleMesh& target) {
   const TriangleMesh boundary = refined_triangles(boundary_surface(mesh, MeshTopology(mesh), nullptr));
   return 100 * surface_distance(boundary, target).mean() / bounding_box_diagonal(target);
@@ -121,12 +121,11 @@ TEST_CASE("A fit far from the origin is as good as one at it", "[slow]") {
 
 TEST_CASE("A fit has the same bits with one and two threads", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const FitResult one = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
-  omp_set_num_threads(2);
+  guard.use(2);
   const FitResult two = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
-  omp_set_num_threads(before);
   CHECK(one.cage.positions == two.cage.positions);
   CHECK(one.mesh.positions == two.mesh.positions);
 }
@@ -232,7 +231,7 @@ TEST_CASE("A cancelled fit returns the best state so far") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick();
   int calls = 0;
-  options.progress = [&](const FitProgress& progress) {
+  options.control.progress = [&](const FitProgress& progress) {
     CHECK(progress.fraction >= 0);
     CHECK(progress.fraction <= 1);
     return ++calls < 3;
@@ -247,7 +246,7 @@ TEST_CASE("A cancelled fit returns the best state so far") {
 TEST_CASE("A time limit ends the fit with a result") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick(3);
-  options.time_limit_seconds = 1e-3;
+  options.control.time_limit_seconds = 1e-3;
   const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
   CHECK(result.report.stop_reason == StopReason::time_limit);
   CHECK(certify(result.mesh).all_certified());
@@ -256,7 +255,7 @@ TEST_CASE("A time limit ends the fit with a result") {
 TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   FitOptions options = quick(1);
-  options.max_iterations = 1;  // converged takes two
+  options.control.max_iterations = 1;  // converged takes two
   const FitReport short_of_steps = fit_subdivision_volume(sample.target, sample.template_mesh, options).report;
   CHECK(short_of_steps.stop_reason == StopReason::iteration_limit);
   CHECK(short_of_steps.stages.back().ended == MinimizerStop::iteration_limit);

@@ -40,9 +40,9 @@ TEST_CASE("The template of a part follows its edges, and so do the fits that sta
 
 TEST_CASE("A template that is not finished has no cells", "[templates]") {
   AutomaticFitOptions options;
-  options.progress = [](const FitProgress&) { return false; };
+  options.control.progress = [](const FitProgress&) { return false; };
   CHECK(fit_template(test::cube_surface(4, true), options).mesh.num_cells() == 0);
-  options.progress = {};
-  options.time_limit_seconds = -1;
+  options.control.progress = {};
+  options.control.time_limit_seconds = -1;
   CHECK_THROWS_AS(fit_template(test::cube_surface(4, true), options), InputError);
 }

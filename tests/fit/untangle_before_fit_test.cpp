@@ -19,7 +19,7 @@ TEST_CASE("a mesh is untangled before it is curved, and left alone where it is v
   const std::size_t tangled = certify(mesh).not_certified.size();
   REQUIRE(tangled > 0);
   OptimizeOptions cancelled;
-  cancelled.progress = [](const FitProgress&) { return false; };
+  cancelled.control.progress = [](const FitProgress&) { return false; };
   const VolumeMesh before = mesh;
   const UntangledStart ended = untangle_before_fit(mesh, cancelled);
   CHECK(ended.stop_reason == StopReason::cancelled);
@@ -27,7 +27,9 @@ TEST_CASE("a mesh is untangled before it is curved, and left alone where it is v
   CHECK(ended.left > 0);
   CHECK(mesh.positions == before.positions);
   OptimizeOptions late;  // all are valid by then, but not improved
-  late.progress = [](const FitProgress& progress) { return !std::string_view(progress.stage).starts_with("round 1"); };
+  late.control.progress = [](const FitProgress& progress) {
+    return !std::string_view(progress.stage).starts_with("round 1");
+  };
   const UntangledStart improving = untangle_before_fit(mesh, late);
   CHECK(improving.ended_early());
   CHECK(improving.left == 0);

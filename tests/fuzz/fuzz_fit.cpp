@@ -78,7 +78,7 @@ void require_finite(const std::vector<Vec3>& points) {
 }
 
 void fit(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start, bool sound) {
-  FitOptions options{.levels = 1, .cage_only = bytes.flag(), .max_iterations = 2};
+  FitOptions options{.levels = 1, .cage_only = bytes.flag(), .control = {.max_iterations = 2}};
   options.surface = bytes.flag() ? FittedSurface::mesh : FittedSurface::limit;
   options.correspondence = bytes.flag() ? Correspondence::voronoi : Correspondence::closest;
   options.solver = bytes.flag() ? SolverKind::lbfgs : SolverKind::newton;
@@ -90,7 +90,7 @@ void fit(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start, bool
 }
 
 void fit_curved(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start, bool sound) {
-  HighOrderFitOptions options{.order = 2, .adaptive = bytes.flag(), .max_iterations = 2};
+  HighOrderFitOptions options{.order = 2, .adaptive = bytes.flag(), .control = {.max_iterations = 2}};
   options.basis = bytes.flag() ? Basis::legendre : Basis::fourier;
   options.improve_worst_places = bytes.flag();
   const HighOrderFitResult result = fit_high_order(target, start, options);
@@ -99,7 +99,7 @@ void fit_curved(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& star
 }
 
 void optimize(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start) {
-  OptimizeOptions options{.max_iterations = 2};
+  OptimizeOptions options{.control = {.max_iterations = 2}};
   const bool has_target = bytes.flag();
   options.fixed_boundary = !has_target && bytes.flag();
   const OptimizeResult result = optimize_mesh(start, has_target ? &target : nullptr, options);

@@ -11,9 +11,9 @@
 #include "tests/support/require_data.h"
 #include "tests/support/shell_fixtures.h"
 #include "tests/support/surface_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <Eigen/Geometry>
 
@@ -125,25 +125,25 @@ TEST_CASE("Sheets of a curved shell run like the surface, with its edges", "[she
 TEST_CASE("A curved shell has the same bits for one thread and for two", "[shell][slow]") {
   const ShellResult shell =
       make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .side = ShellSide::both, .layers = 2});
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const CurvedShell one = curve_shell(shell, {.order = 2});
-  omp_set_num_threads(2);
+  guard.use(2);
   const CurvedShell two = curve_shell(shell, {.order = 2});
-  omp_set_num_threads(before);
   CHECK(one.mesh.coefficients == two.mesh.coefficients);
 }
 
 TEST_CASE("A shell whose curving is stopped is valid", "[shell][slow]") {
   const ShellResult shell = make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .layers = 2});
-  const CurvedShell curved = curve_shell(shell, {.order = 2, .progress = [](const FitProgress&) { return false; }});
+  const CurvedShell curved =
+      curve_shell(shell, {.order = 2, .control = {.progress = [](const FitProgress&) { return false; }}});
   CHECK(curved.report.stop_reason == StopReason::cancelled);
   check_valid(shell, curved);
 }
 
 TEST_CASE("A curved shell says when the steps allowed were not enough", "[shell][slow]") {
   const ShellResult shell = make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .layers = 2});
-  const CurvedShell curved = curve_shell(shell, {.order = 2, .max_iterations = 1});
+  const CurvedShell curved = curve_shell(shell, {.order = 2, .control = {.max_iterations = 1}});
   CHECK(curved.report.stop_reason == StopReason::iteration_limit);
   check_valid(shell, curved);
   CHECK(curve_shell(shell, {.order = 2}).report.stop_reason == StopReason::converged);
@@ -153,7 +153,7 @@ TEST_CASE("Shells that cannot be curved are refused", "[shell]") {
   ShellResult shell = make_shell(plane(Faces::quads), {.thickness = 0.1});
   CHECK_THROWS_AS(curve_shell(shell, {.order = 0}), InputError);
   CHECK_THROWS_AS(curve_shell(shell, {.order = kMaxOrder + 1}), InputError);
-  CHECK_THROWS_AS(curve_shell(shell, {.max_iterations = -1}), InputError);
+  CHECK_THROWS_AS(curve_shell(shell, {.control = {.max_iterations = -1}}), InputError);
   shell.failures.intersecting.push_back({0, 1});
   CHECK_THROWS_AS(curve_shell(shell, {}), InputError);
 }

@@ -15,9 +15,9 @@
 #include "tests/support/require_data.h"
 #include "tests/support/shell_fixtures.h"
 #include "tests/support/surface_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <Eigen/LU>
 
@@ -219,7 +219,7 @@ TEST_CASE("Scaling, moving and turning the surface does the same to its shell", 
 }
 
 TEST_CASE("Walls that face each other share the room between them", "[shell][slow]") {
-  // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend towards each
+  // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend toward each
   // other.
   const std::vector<Vec3> u = profile({{0, 2, 0}, {0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, 8);
   const std::vector<Vec3> l = profile({{0, 2, 0}, {0, 0, 0}, {2, 0, 0}}, 8);
@@ -342,23 +342,23 @@ TEST_CASE("Sharp edges of a surface are found by their angle", "[shell]") {
 
 TEST_CASE("A shell has the same bits for one thread and for two", "[shell]") {
   const PolygonMesh surface = as_polygons(cube_surface(6, false));
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const ShellResult one = make_shell(surface, {.thickness = 0.5, .side = ShellSide::both, .layers = 2});
-  omp_set_num_threads(2);
+  guard.use(2);
   const ShellResult two = make_shell(surface, {.thickness = 0.5, .side = ShellSide::both, .layers = 2});
-  omp_set_num_threads(before);
   CHECK(one.mesh.positions == two.mesh.positions);
 }
 
 TEST_CASE("A shell can be stopped at any step and is valid all the same", "[shell]") {
   int calls = 0;
-  const ShellResult shell = make_shell(as_polygons(cube_surface(6, false)),
-                                       {.thickness = 0.5, .layers = 2, .progress = [&](const FitProgress& progress) {
-                                          CHECK(progress.fraction >= 0);
-                                          CHECK(progress.fraction <= 1);
-                                          return ++calls < 3;
-                                        }});
+  const ShellResult shell =
+      make_shell(as_polygons(cube_surface(6, false)),
+                 {.thickness = 0.5, .layers = 2, .control = {.progress = [&](const FitProgress& progress) {
+                                                   CHECK(progress.fraction >= 0);
+                                                   CHECK(progress.fraction <= 1);
+                                                   return ++calls < 3;
+                                                 }}});
   CHECK(shell.report.stop_reason == StopReason::cancelled);
   CHECK(calls == 3);
   CHECK(shell.report.stages.empty());
@@ -376,7 +376,7 @@ TEST_CASE("A shell that is cancelled in a long search, before there is any, has 
   }
   ShellOptions options{.thickness = 0.01, .optimize = false};
   CHECK(make_shell(cones, options).failures.none());
-  options.cancelled = [] { return true; };
+  options.control.cancelled = [] { return true; };
   const ShellResult result = make_shell(cones, options);
   CHECK(result.report.stop_reason == StopReason::cancelled);
   CHECK(result.mesh.num_cells() == 0);

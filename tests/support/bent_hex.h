@@ -15,8 +15,8 @@ struct BentHex {
   std::vector<Vec3> coefficients;
 };
 
-/// Near the straight cell of these edges: coefficients are moved by `bent` at the most, less for higher modes. Each mode
-/// but the vertices' is left out with a probability.
+/// Near the straight cell of these edges: coefficients are moved by `bent` at the most, less for higher modes. Each
+/// mode but the vertices' is left out with a probability.
 template <class Random>
 BentHex bent_hex(Random& random, int order, const Mat3& edges, double bent, double share_left_out) {
   const auto uniform = [&](double low, double high) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/certificate/certificate.h"
+#include "subvol/base/error.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
@@ -244,10 +244,10 @@ TEST_CASE("the batch agrees with the single cells for any number of threads", "[
     std::vector<Index> expected;
     for (std::size_t c = 0; c < cells.size(); ++c)
       if (certify_cell(kind, cells[c]).validity != CellValidity::valid) expected.push_back(static_cast<Index>(c));
-    const int before = omp_get_max_threads();
+    test::ThreadGuard guard;
     std::vector<std::vector<double>> minima;
     for (int threads : {1, 2}) {
-      omp_set_num_threads(threads);
+      guard.use(threads);
       const CertificateSummary summary = certify(mesh);
       CHECK(summary.not_certified == expected);
       CHECK(summary.certified + summary.invalid + summary.undecided == cells.size());
@@ -255,7 +255,6 @@ TEST_CASE("the batch agrees with the single cells for any number of threads", "[
       minima.emplace_back(cells.size());
       min_bernstein(mesh.positions, mesh, minima.back());
     }
-    omp_set_num_threads(before);
     CHECK(minima[0] == minima[1]);
     std::vector<std::uint8_t> positive(cells.size());
     const std::size_t zeros = positive_bernstein(mesh.positions, mesh, positive);

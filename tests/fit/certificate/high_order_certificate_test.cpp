@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
-#include "subvol/fit/certificate/high_order_certificate.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -194,18 +194,17 @@ TEST_CASE("order 1 agrees with the certificate of linear cells", "[high_order_ce
 
 TEST_CASE("all cells of a mesh are judged alike with any number of threads and numbering", "[high_order_certificate]") {
   PointSource source(109);
-  const int threads = omp_get_max_threads();
+  test::ThreadGuard guard;
   for (const Basis basis : kBothBases) {
     const HighOrderMesh mesh = curved(renumbered(lattice(3, 3, 2), source.random()), basis, 4, 1.2, source);
     CertificateSummary summary;
     for (const int n : {1, 2, 8}) {
-      omp_set_num_threads(n);
+      guard.use(n);
       const CertificateSummary again = certify(mesh.space, mesh.coefficients);
       if (n > 1) CHECK(again.not_certified == summary.not_certified);
       if (n > 1) CHECK(again.invalid_cells == summary.invalid_cells);
       summary = again;
     }
-    omp_set_num_threads(threads);
     CHECK(summary.certified > 0);
     CHECK(summary.invalid > 0);
     for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/elements/point_tables.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/boundary_samples.h"
-#include "subvol/fit/elements/point_tables.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -111,15 +111,14 @@ TEST_CASE("products with tables have the same bits for any number of threads", "
   const PointTables tables(space, samples.points);
   const std::vector<Vec3> x = vectors(space.num_nodes(), source), g = vectors(samples.points.size(), source);
   const auto products = [&](int threads) {
-    omp_set_num_threads(threads);
+    test::ThreadGuard guard;
+    guard.use(threads);
     std::pair result(std::vector<Vec3>(g.size()), std::vector<Vec3>(x.size()));
     tables.apply(x, result.first);
     tables.apply_transposed(g, result.second);
     return result;
   };
-  const int threads = omp_get_max_threads();
   const auto one = products(1), two = products(2);
-  omp_set_num_threads(threads);
   CHECK(one == two);
 }
 

@@ -98,7 +98,7 @@ TEST_CASE("A part of the edges keeps those whose cells it has", "[quality]") {
   const BoundaryFolds whole(bar);
   const std::vector<Index> cells{1, 2};
   const BoundaryFolds part(whole, cells);
-  // The cells 1 and 2 have four edges each along the bar, four between them, and four at the end. Those towards cell 0
+  // The cells 1 and 2 have four edges each along the bar, four between them, and four at the end. Those toward cell 0
   // lack a cell.
   CHECK(part.size() == 16);
   for (std::size_t e = 0; e < part.size(); ++e)

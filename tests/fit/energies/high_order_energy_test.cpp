@@ -6,10 +6,10 @@
 #include "subvol/fit/quality/quality.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <cmath>
 #include <limits>
@@ -391,16 +391,15 @@ TEST_CASE("the energy of curved cells has the same bits for one and two threads"
   const ElementSpace space(mesh, Basis::fourier, 3);
   HighOrderEnergy energy(space, std::vector(space.num_cells(), Vec3(0.8, 0.8, 0.8)), points_of(space, 5));
   const std::vector<Vec3> x = bent(space, mesh, source, 0.01);
-  const int threads = omp_get_max_threads();
+  test::ThreadGuard guard;
   std::vector<std::vector<Vec3>> results;
   for (int n : {1, 2}) {
-    omp_set_num_threads(n);
+    guard.use(n);
     std::vector<Vec3> gradient(x.size(), Vec3::Zero()), product(x.size());
     gradient[0][0] += energy.linearize(x, 1, gradient);
     energy.multiply(x, product);
     gradient.insert(gradient.end(), product.begin(), product.end());
     results.push_back(std::move(gradient));
   }
-  omp_set_num_threads(threads);
   CHECK(results[0] == results[1]);
 }

@@ -3,10 +3,10 @@
 
 #include "subvol/base/error.h"
 #include "tests/support/surface_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/Eigenvalues>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <cmath>
 #include <cstring>
@@ -200,13 +200,13 @@ TEST_CASE("the surface energy's Hessian is symmetric and positive semidefinite")
 TEST_CASE("the surface energy has the same bits for one and two threads, and for every history", "[slow]") {
   const TriangleMesh mesh = cube_surface(20, true);
   const TargetSurface target(cube_surface(24, false));
-  const int before = omp_get_max_threads();
+  test::ThreadGuard guard;
   RandomPoints random(11);
   std::vector<Vec3> z = mesh.positions;
   std::vector<double> values[2];
   std::vector<Vec3> gradients[2];
   for (int run = 0; run < 2; ++run) {
-    omp_set_num_threads(run + 1);
+    guard.use(run + 1);
     SurfaceEnergy energy(target, mesh.triangles, z.size(), 0.1);
     if (run == 1) energy.assign(random.points(z.size()));
     energy.assign(z);
@@ -216,7 +216,6 @@ TEST_CASE("the surface energy has the same bits for one and two threads, and for
     energy.add_gradient(y, gradients[run]);
     values[run] = {energy.value(z), energy.value(y), energy.target_to_surface()};
   }
-  omp_set_num_threads(before);
   CHECK(values[0] == values[1]);
   CHECK(gradients[0] == gradients[1]);
 }

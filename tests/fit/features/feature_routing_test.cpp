@@ -9,8 +9,7 @@
 #include "subvol/fit/features/routing_graph.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "tests/support/feature_fixtures.h"
-
-#include <omp.h>
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
 
@@ -372,12 +371,11 @@ TEST_CASE("routing that is cancelled finds no more paths") {
 }
 
 TEST_CASE("routing is the same for any number of threads") {
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const FeatureRouting one = RoutedLattice(tetrahedron_surface(), 5).routing;
-  omp_set_num_threads(3);
+  guard.use(3);
   const FeatureRouting three = RoutedLattice(tetrahedron_surface(), 5).routing;
-  omp_set_num_threads(threads);
   REQUIRE(one.paths.size() == three.paths.size());
   for (std::size_t i = 0; i < one.paths.size(); ++i) CHECK(one.paths[i].vertices == three.paths[i].vertices);
   CHECK(one.corners == three.corners);

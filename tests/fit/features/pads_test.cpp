@@ -54,7 +54,8 @@ std::map<std::pair<int, int>, int> edges_by_angle(const PatchedMesh& patched, co
   return count;
 }
 
-/// Checks what every pad must keep: a valid mesh, closed paths that end at the same corners, and patches bounded by paths.
+/// Checks what every pad must keep: a valid mesh, closed paths that end at the same corners, and patches bounded by
+/// paths.
 void require_sound_pads(const PatchedMesh& patched, const PatchedMesh& before) {
   CHECK(validate(patched.mesh).empty());
   CHECK(patched.fitted.size() == patched.mesh.num_vertices());

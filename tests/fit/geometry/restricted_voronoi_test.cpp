@@ -3,9 +3,9 @@
 
 #include "subvol/base/error.h"
 #include "tests/support/surface_fixtures.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
@@ -289,13 +289,12 @@ TEST_CASE("pieces have the same bits for one and two threads, and after moving t
   const TriangleMesh mesh = cube_surface(40, true);
   RandomPoints random(17);
   std::vector<Vec3> sites = random.points(3000, 1.2);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   RestrictedVoronoi voronoi(sites);
   const auto one = voronoi.compute(mesh.positions, mesh.triangles);
-  omp_set_num_threads(2);
+  guard.use(2);
   const auto two = voronoi.compute(mesh.positions, mesh.triangles);
-  omp_set_num_threads(before);
   CHECK(same_bits(one, two));
   for (double step : {1e-3, 1.0}) {
     auto moved = sites;

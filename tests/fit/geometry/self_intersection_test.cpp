@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/base/error.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -85,12 +85,11 @@ TEST_CASE("self-intersections of a soup do not depend on threads, numbering or p
     for (int k = 0; k < 3; ++k) soup.positions.push_back(center + Vec3(normal(engine), normal(engine), normal(engine)));
     soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const Pairs one = self_intersections(soup).pairs;
-  omp_set_num_threads(2);
+  guard.use(2);
   const Pairs two = self_intersections(soup).pairs;
-  omp_set_num_threads(before);
   CHECK(one == two);
   CHECK(one.size() > 100);
   TriangleMesh reversed = soup;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
-#include "subvol/fit/geometry/surface_distance.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <cmath>
 #include <limits>
@@ -123,12 +123,11 @@ TEST_CASE("one-sided distances differ where one surface is a part of the other",
 
 TEST_CASE("distances have the same bits for one and two threads", "[distance]") {
   const TriangleMesh a = sphere(1, 60), b = sphere(1.01, 41);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const SurfaceDistance one = surface_distance(a, b);
-  omp_set_num_threads(2);
+  guard.use(2);
   const SurfaceDistance two = surface_distance(a, b);
-  omp_set_num_threads(before);
   CHECK(one.mean_a_to_b == two.mean_a_to_b);
   CHECK(one.mean_b_to_a == two.mean_b_to_a);
   CHECK(one.max_a_to_b.from == two.max_a_to_b.from);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/quality/quality.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/element_rule.h"
-#include "subvol/fit/quality/quality.h"
+#include "tests/support/threads.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <limits>
 #include <numeric>
@@ -145,12 +145,11 @@ TEST_CASE("quality has the same bits for one and two threads, in lanes and alone
     mesh.positions.insert(mesh.positions.end(), cell.positions.begin(), cell.positions.end());
     mesh.add_cell(cell.kinds[0], vertices);
   }
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
+  test::ThreadGuard guard;
+  guard.use(1);
   const QualityReport one = measure_quality(mesh);
-  omp_set_num_threads(2);
+  guard.use(2);
   const QualityReport two = measure_quality(mesh);
-  omp_set_num_threads(before);
   CHECK(one.cell_minima == two.cell_minima);
   CHECK(one.mean_scaled_jacobian == two.mean_scaled_jacobian);
   for (std::size_t c = 0; c < alone.size(); ++c) CHECK(std::abs(one.cell_minima[c] - alone[c]) < kTolerance);

@@ -8,10 +8,10 @@
 #include "subvol/fit/target/target_surface.h"
 #include "tests/support/region_fixtures.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
 
-#include <omp.h>
 #include <array>
 #include <memory>
 #include <numeric>
@@ -84,8 +84,9 @@ TEST_CASE("Levenberg-Marquardt raises scaled Jacobians, keeps certificates, the 
   const VolumeMesh mesh = disturbed_lattice();
   const QualityReport before = measure_quality(mesh);
   std::vector<std::vector<Vec3>> results;
+  test::ThreadGuard guard;
   for (const int threads : {1, 3}) {
-    omp_set_num_threads(threads);
+    guard.use(threads);
     FitProblem problem = problem_of(mesh);
     std::vector<Vec3> x = mesh.positions;
     const MinimizerResult result = minimize_levenberg_marquardt(problem, x, options_of(12));
@@ -96,7 +97,6 @@ TEST_CASE("Levenberg-Marquardt raises scaled Jacobians, keeps certificates, the 
     }
     results.push_back(std::move(x));
   }
-  omp_set_num_threads(omp_get_num_procs());
   CHECK(results[0] == results[1]);
   VolumeMesh after = mesh;
   after.positions = results[0];

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runs that go on from what an earlier one has solved; the files that hold it.
 
+#include "subvol/fit/stages/checkpoint.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
 #include "subvol/base/fingerprint.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/optimize_mesh.h"
-#include "subvol/fit/stages/checkpoint.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 #include <cstring>
 
@@ -75,8 +75,8 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits", "[slow]"
   const samples::Sample sample = samples::ball_sample();
   for (const bool cage_only : {false, true})
     check_that_it_resumes([&](StageLog* log) {
-      FitOptions options{.levels = 2, .cage_only = cage_only, .max_iterations = 2};
-      options.log = log;
+      FitOptions options{.levels = 2, .cage_only = cage_only, .control = {.max_iterations = 2}};
+      options.control.log = log;
       const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
       std::vector<Vec3> all = result.mesh.positions;
       all.insert(all.end(), result.cage.positions.begin(), result.cage.positions.end());
@@ -88,7 +88,7 @@ TEST_CASE("A fit that was stopped within a minimization ends at the same bits", 
   const samples::Sample sample = samples::ball_sample();
   const auto run = [&](StageLog* log) {
     FitOptions options{.levels = 2};
-    options.log = log;
+    options.control.log = log;
     return fit_subdivision_volume(sample.target, sample.template_mesh, options);
   };
   // This holds the checkpoint of each moment at which a minimization was not over.
@@ -114,8 +114,8 @@ TEST_CASE("A minimization that was stopped after cells were densified ends at th
   const samples::Sample sample = samples::torus_sample();
   const auto run = [&](StageLog* log) {
     HighOrderFitOptions options{
-        .order = 2, .basis = Basis::fourier, .tolerance_percent = 0.01, .max_iterations = 12};
-    options.log = log;
+        .order = 2, .basis = Basis::fourier, .tolerance_percent = 0.01, .control = {.max_iterations = 12}};
+    options.control.log = log;
     return fit_high_order(sample.target, sample.template_mesh, options);
   };
   std::vector<SolvedStage> moment;
@@ -138,14 +138,15 @@ TEST_CASE("A minimization that was stopped after cells were densified ends at th
 
 TEST_CASE("A fit with stages that were undone, and with one thread or two, goes on the same way", "[slow]") {
   const samples::Sample sample = samples::bracket_sample();
-  FitOptions options{.levels = 2, .tolerance_percent = 1e-3, .max_iterations = 2};
+  FitOptions options{.levels = 2, .tolerance_percent = 1e-3, .control = {.max_iterations = 2}};
   StageLog whole;
-  options.log = &whole;
-  omp_set_num_threads(1);
+  options.control.log = &whole;
+  test::ThreadGuard guard;
+  guard.use(1);
   const FitResult wanted = fit_subdivision_volume(sample.target, sample.template_mesh, options);
-  omp_set_num_threads(2);
+  guard.use(2);
   StageLog log = reloaded(whole, whole.stages().size() - 2);
-  options.log = &log;
+  options.control.log = &log;
   const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
   CHECK(same_bits(result.mesh.positions, wanted.mesh.positions));
   CHECK(told(result.report) == told(wanted.report));
@@ -155,8 +156,9 @@ TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the s
   const samples::Sample sample = samples::ball_sample();
   for (const bool adaptive : {false, true})
     check_that_it_resumes([&](StageLog* log) {
-      HighOrderFitOptions options{.order = 2, .adaptive = adaptive, .tolerance_percent = 0.5, .max_iterations = 2};
-      options.log = log;
+      HighOrderFitOptions options{
+          .order = 2, .adaptive = adaptive, .tolerance_percent = 0.5, .control = {.max_iterations = 2}};
+      options.control.log = log;
       HighOrderFitResult result = fit_high_order(sample.target, sample.template_mesh, options);
       return std::pair(result.mesh.coefficients, result.report);
     });
@@ -171,7 +173,7 @@ TEST_CASE("An optimization that goes on from a checkpoint ends at the same bits"
   REQUIRE(test::count_inverted(mesh) > 0);
   check_that_it_resumes([&](StageLog* log) {
     OptimizeOptions options;
-    options.log = log;
+    options.control.log = log;
     const OptimizeResult result = optimize_mesh(mesh, nullptr, options);
     return std::pair(result.mesh.positions, result.report);
   });
@@ -183,8 +185,8 @@ TEST_CASE("An optimization whose boundary is far from its target goes on to the 
   TriangleMesh target = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
   for (Vec3& p : target.positions) p = Vec3(1.5, 1.5, 1.5) + 1.5 * (p - Vec3(1.5, 1.5, 1.5));
   check_that_it_resumes([&](StageLog* log) {
-    OptimizeOptions options{.max_iterations = 3};
-    options.log = log;
+    OptimizeOptions options{.control = {.max_iterations = 3}};
+    options.control.log = log;
     const OptimizeResult result = optimize_mesh(mesh, &target, options);
     return std::pair(result.mesh.positions, result.report);
   });
@@ -249,11 +251,11 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
 TEST_CASE("A log of another run is refused where it first differs", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   StageLog log;
-  FitOptions options{.levels = 1, .max_iterations = 2};
-  options.log = &log;
+  FitOptions options{.levels = 1, .control = {.max_iterations = 2}};
+  options.control.log = &log;
   fit_subdivision_volume(sample.target, sample.template_mesh, options);
   StageLog again = reloaded(log, log.stages().size());
-  options.log = &again;
+  options.control.log = &again;
   options.lambda_close = 0.01;
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, sample.template_mesh, options), InputError);
   VolumeMesh moved = sample.template_mesh;

@@ -62,9 +62,9 @@ TEST_CASE("Points of Nastran in other coordinate systems are taken into the basi
     return read_nastran(kNastranPoints + systems + grid + kNastranTet).positions.back();
   };
   CHECK(is_near(point("GRID,9,5,2.,90.,4.\n"), {5, 2, 5}));   // y of system 5 is z
-  CHECK(is_near(point("GRID,9,6,2.,0.,30.\n"), {4, 2, 3}));   // towards its z
-  CHECK(is_near(point("GRID,9,6,2.,90.,0.\n"), {2, 4, 3}));   // towards its x
-  CHECK(is_near(point("GRID,9,6,2.,90.,90.\n"), {2, 2, 5}));  // towards its y
+  CHECK(is_near(point("GRID,9,6,2.,0.,30.\n"), {4, 2, 3}));   // toward its z
+  CHECK(is_near(point("GRID,9,6,2.,90.,0.\n"), {2, 4, 3}));   // toward its x
+  CHECK(is_near(point("GRID,9,6,2.,90.,90.\n"), {2, 2, 5}));  // toward its y
   CHECK(is_near(point("GRID,9,8,1.,2.,3.\n"), {1, 2, 3}));
   CHECK(is_near(point("GRID,9,7,0.,0.,3.\n"), {1, 1, 4}));
   CHECK(is_near(point("GRID,9,0,1.,2.,3.\nGRDSET,,6\n"), {1, 2, 3}));

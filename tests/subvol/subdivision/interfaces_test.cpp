@@ -56,8 +56,8 @@ std::vector<VolumeMesh> meshes_of_regions() {
   return meshes;
 }
 
-/// The children of the faces, edges and vertices of the sheets by the rules as the paper states them, found with sets of
-/// faces instead of half-edges.
+/// The children of the faces, edges and vertices of the sheets by the rules as the paper states them, found with sets
+/// of faces instead of half-edges.
 class DirectSheets {
  public:
   explicit DirectSheets(const VolumeMesh& mesh) : mesh_(mesh), topology_(mesh) {

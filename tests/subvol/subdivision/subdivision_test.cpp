@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/subdivision/subdivision.h"
 #include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/row_assembly.h"
-#include "subvol/subdivision/subdivision.h"
 #include "tests/support/opensubdiv_oracle.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/threads.h"
 
 #include <catch2/catch.hpp>
-#include <omp.h>
 
 namespace subvol::test {
 
@@ -251,12 +251,11 @@ TEST_CASE("one and two threads give the same bits", "[subdivision]") {
   VolumeMesh mesh = lattice(5, 4, 4);
   jitter(mesh, 0.2);
   tag_creases(mesh, 40, 1.5);
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
+  subvol::test::ThreadGuard guard;
+  guard.use(1);
   const SubdivisionLevel one = subdivide(subdivide(mesh).fine);
-  omp_set_num_threads(2);
+  guard.use(2);
   const SubdivisionLevel two = subdivide(subdivide(mesh).fine);
-  omp_set_num_threads(threads);
   CHECK(one.matrix.columns == two.matrix.columns);
   CHECK(one.matrix.values == two.matrix.values);
   CHECK(one.matrix.offsets == two.matrix.offsets);

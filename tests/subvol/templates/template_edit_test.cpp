@@ -22,6 +22,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using test::check_mesh_is;
 using test::euler_number;
 using test::volume_of;
