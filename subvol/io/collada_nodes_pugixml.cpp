@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
 #include "subvol/io/scene_nodes.h"
 
 #include <pugixml.hpp>
 
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <map>
 #include <string>
 #include <unordered_map>
@@ -23,6 +27,7 @@ class ColladaNodes {
     collect(document);
     for (const auto& [place, target] : instances_) add_instance(place, target);
     require_sound_nodes(name_, children_, 0);
+    for (const pugi::xml_node& accessor : accessors_) require_within_array(accessor);
   }
 
  private:
@@ -47,6 +52,8 @@ class ColladaNodes {
 
   void visit(const pugi::xml_node& element) {
     const std::string_view kind = element.name();
+    if (kind.ends_with("_array")) visit_array(element);
+    if (kind == "accessor") accessors_.push_back(element);
     const auto parent = places_.find(element.parent().internal_object());
     if (kind == "instance_node" && parent != places_.end()) {
       const std::string_view url = element.attribute("url").value();
@@ -61,6 +68,30 @@ class ColladaNodes {
     children_[parent == places_.end() ? 0 : parent->second].push_back(place);
     names_.emplace(element.attribute("name").value(), place);
     names_.emplace(id, place);
+  }
+
+  /// Notes the number of values that an array says it has, the smallest one of arrays with the same id.
+  void visit_array(const pugi::xml_node& array) {
+    const std::size_t count = array.attribute("count").as_uint(), bytes = std::strlen(array.child_value());
+    if (count > bytes) throw InputError(name_ + ": an array has a count of " + std::to_string(count) + ", too many");
+    const auto [known, is_new] = array_sizes_.try_emplace(array.attribute("id").value(), count);
+    if (!is_new) known->second = std::min(known->second, count);
+  }
+
+  void require_within_array(const pugi::xml_node& accessor) const {
+    const std::string_view source = accessor.attribute("source").value();
+    const auto array = array_sizes_.find(std::string(source.substr(source.starts_with('#'))));
+    if (array == array_sizes_.end()) return;  // Assimp refuses it
+    const int count = accessor.attribute("count").as_int();
+    const std::uint64_t offset = accessor.attribute("offset").as_uint(),
+                        stride = accessor.attribute("stride").as_uint(1);
+    std::uint64_t size = 0;  // of an entry
+    for (const pugi::xml_node& param : accessor.children("param"))
+      size += param.attribute("type").value() == std::string_view("float4x4") ? 16 : 1;
+    const std::uint64_t entries = static_cast<std::uint64_t>(std::max(count, 0));
+    if (count < 0 ||
+        (entries > 0 && offset + (entries - 1) * stride + std::max<std::uint64_t>(size, 1) > array->second))
+      throw InputError(name_ + ": the accessor of " + in_quotes(source) + " reaches beyond its array");
   }
 
   /// Adds the nodes that an instance may name: those of a library or scene with the id; else any with the id or name.
@@ -80,13 +111,16 @@ class ColladaNodes {
   std::multimap<std::string, std::size_t> library_, names_;     ///< nodes in no other, by id; all, by id and by name
   std::vector<std::pair<std::size_t, std::string>> instances_;  ///< the node that has it, and what it names
   std::size_t num_added_ = 0;
+  std::vector<pugi::xml_node> accessors_;
+  std::map<std::string, std::size_t> array_sizes_;  ///< by id
 };
 
 }  // namespace
 
 void require_sound_collada(const std::string& name, std::string_view bytes) {
   pugi::xml_document document;
-  if (document.load_buffer(bytes.data(), bytes.size())) ColladaNodes(name).require_sound(document);
+  if (!document.load_buffer(bytes.data(), bytes.size())) return;
+  ColladaNodes(name).require_sound(document);
 }
 
 }  // namespace subvol::internal

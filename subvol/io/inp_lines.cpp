@@ -173,6 +173,7 @@ void InpLines::replay(Part& part, const InpInstance& instance) {
   part.is_used = true;
   is_replaying_ = true;
   line_.instance = &instance;
+  line_.keyword.clear();  // data before the first keyword of the part do not belong to the one that closed the instance
   for (const RawLine& raw : part.lines) {
     if (raw.text.starts_with("*"))
       take_keyword(raw, 0);

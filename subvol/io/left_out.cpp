@@ -7,17 +7,21 @@ namespace subvol {
 
 void LeftOut::add(std::string_view what, std::size_t n) {
   if (n == 0) return;
-  const auto is_known = [&](const auto& count) { return count.first == what; };
-  const auto known = std::find_if(counts_.begin(), counts_.end(), is_known);
-  if (known == counts_.end())
-    counts_.emplace_back(std::string(what), n);
-  else
-    known->second += n;
+  const auto known = places_.find(what);
+  if (known != places_.end()) {
+    counts_[known->second].second += n;
+    return;
+  }
+  places_.emplace(what, counts_.size());
+  counts_.emplace_back(what, n);
 }
 
 std::string LeftOut::text() const {
+  constexpr std::size_t kMostKinds = 100;
   std::string text;
-  for (const auto& [what, n] : counts_) text += (text.empty() ? "" : ", ") + std::to_string(n) + " " + what;
+  for (std::size_t i = 0; i < std::min(counts_.size(), kMostKinds); ++i)
+    text += (i == 0 ? "" : ", ") + std::to_string(counts_[i].second) + " " + counts_[i].first;
+  if (counts_.size() > kMostKinds) text += ", " + std::to_string(counts_.size() - kMostKinds) + " other kinds";
   return text;
 }
 

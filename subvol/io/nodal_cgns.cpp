@@ -38,6 +38,21 @@ NodalMesh parse_cgns(const std::string& name, std::string_view, const std::strin
 
 namespace {
 
+/// Throws InputError unless the file begins as HDF5 or as ADF, the older format: the library ends the program if a
+/// header is neither.
+void require_cgns_header(const std::string& name, std::string_view bytes) {
+  constexpr std::string_view kHdf5("\x89HDF\r\n\x1a\n", 8), kAdf = "ADF Database Version", kFormats = "BLCN";
+  constexpr std::size_t kAdfAt = 4, kFormatAt = 100, kAdfHeader = 186;
+  constexpr std::pair<std::size_t, std::string_view> kMarks[] = {{32, "AdF0"},  {64, "AdF1"},  {96, "AdF2"},
+                                                                 {102, "AdF3"}, {130, "AdF4"}, {182, "AdF5"}};
+  if (bytes.starts_with(kHdf5)) return;
+  const auto holds = [&](std::size_t at, std::string_view text) { return bytes.substr(at, text.size()) == text; };
+  const bool is_adf = bytes.size() >= kAdfHeader && holds(kAdfAt, kAdf) &&
+                      std::ranges::all_of(kMarks, [&](const auto& mark) { return holds(mark.first, mark.second); });
+  if (!is_adf || kFormats.find(bytes[kFormatAt]) == std::string_view::npos)
+    throw InputError(name + ": no CGNS file: it begins neither as HDF5 nor as ADF");
+}
+
 /// A copy of the bytes on the disk, since the library opens nothing else.
 class CopyOnDisk {
  public:
@@ -424,6 +439,7 @@ class CgnsParser {
 }  // namespace
 
 NodalMesh parse_cgns(const std::string& name, std::string_view bytes, const std::string&) {
+  require_cgns_header(name, bytes);
   const std::lock_guard lock(cgns_lock());
   return CgnsParser(name, bytes).parse();
 }

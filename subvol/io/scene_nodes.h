@@ -19,7 +19,8 @@ inline constexpr int kMostSceneDepth = 500;
 void require_sound_nodes(const std::string& name, const SceneNodes& children, std::size_t root);
 
 /// Throw InputError, naming the file, if the nodes of a scene are as above or its elements are too deep in one another.
-/// Assimp would take all memory or run over the end of the stack. All other faults are left for Assimp to find.
+/// Assimp would take all memory or run over the end of the stack. The same for accessors of COLLADA that reach beyond
+/// their arrays, which Assimp reads. All other faults are left for Assimp to find.
 void require_sound_collada(const std::string& name, std::string_view bytes);
 void require_sound_fbx(const std::string& name, std::string_view bytes);
 

@@ -255,6 +255,9 @@ TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]")
              Contains("expected a number, found 'x'"));
   CHECK_THAT(nodal_refusal("a.inp", part + "*INSTANCE, NAME=b, PART=a\n0,0,0\n0,0,0,0,0,0,90\n*END INSTANCE\n"),
              Contains("two points of the axis are one"));
+  // Lines of a part before its first keyword belong to no keyword, also not to the one behind the instance.
+  CHECK_THAT(nodal_refusal("a.inp", "*PART, NAME=p\n1, 2\n*END PART\n*INSTANCE, NAME=q, PART=p\n*NSET, NSET=s\n"),
+             Contains("no hexes"));
   CHECK_THAT(nodal_refusal("a.inp", part + "*NSET, NSET=s, INSTANCE=d\n1\n"), Contains("no instance 'd'"));
 }
 

@@ -121,6 +121,23 @@ TEST_CASE("COLLADA whose nodes hold themselves, double, or are too deep in one a
   CHECK(scene_refusal(require_sound_collada, "no XML").empty());  // Assimp says why
 }
 
+TEST_CASE("COLLADA whose accessors reach beyond their arrays is refused", "[io][quick]") {
+  const auto refusal = [](const std::string& array, const std::string& accessor) {
+    return scene_refusal(require_sound_collada, "<COLLADA><source><float_array id=\"a\" " + array +
+                                                    ">0 0 0 1 0 0 0 1 0</float_array><accessor source=\"#a\" " +
+                                                    accessor +
+                                                    "><param/><param/><param/></accessor></source></COLLADA>");
+  };
+  CHECK(refusal("count=\"9\"", "count=\"3\" stride=\"3\"").empty());
+  CHECK(refusal("count=\"0\"", "count=\"0\" stride=\"3\"").empty());
+  for (const char* accessor : {"count=\"4\" stride=\"3\"", "count=\"3\" stride=\"4\"",
+                               "count=\"3\" stride=\"3\" offset=\"1\"", "count=\"-1\" stride=\"3\""})
+    CHECK_THAT(refusal("count=\"9\"", accessor), Contains("beyond its array"));
+  for (const char* array : {"", "count=\"8\"", "count=\"-1\""})
+    CHECK_THAT(refusal(array, "count=\"3\" stride=\"3\""), Contains("beyond its array"));
+  CHECK_THAT(refusal("count=\"4000000000\"", "count=\"3\" stride=\"3\""), Contains("too many"));
+}
+
 TEST_CASE("FBX whose models hold themselves, double, or are too deep in one another is refused", "[io][quick]") {
   const auto refusal = [](const std::string& objects, const std::string& connections) {
     return scene_refusal(require_sound_fbx, fbx_text(objects, connections));
