@@ -25,6 +25,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"level", trial.level},
                       {"cells", trial.cells},
                       {"through_planes", trial.through_planes},
+                      {"grids", trial.grids},
                       {"refined_cells", trial.refined_cells},
                       {"pads", trial.pads},
                       {"sharp_edges", trial.curves},

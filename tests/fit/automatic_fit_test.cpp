@@ -5,9 +5,11 @@
 #include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/io/surface_io.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/feature_fixtures.h"
+#include "tests/support/require_data.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -96,6 +98,16 @@ TEST_CASE("Both edges of a chamfer narrower than a cell are followed", "[slow]")
   const MeshCheck check = check_mesh(result.mesh, &target, {});
   CHECK(check.valid());
   CHECK(check.quality->min_scaled_jacobian > 0.5);
+}
+
+TEST_CASE("If the first grid loses long edges, one that loses none is looked for", "[slow]") {
+  const auto data = test::require_data();
+  if (!data) return;
+  const TriangleMesh target = read_triangle_mesh(*data / "auto/parts/Drag_Chain_Spacer_x1.stl");
+  const AutomaticFitResult result = fit_automatically(target, {.cells = 2500});
+  CHECK(result.trials.front().grids > 1);
+  CHECK(result.trials[result.chosen].long_edges_lost == 0);
+  CHECK(result.report.stop_reason == StopReason::converged);
 }
 
 TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
