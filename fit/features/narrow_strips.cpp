@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/narrow_strips.h"
 
+#include "subvol/base/sort_unique.h"
 #include "subvol/fit/features/patch_fans.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_geometry.h"
@@ -429,8 +430,7 @@ std::vector<Index> strips_in_parts(const FeatureRouting& routing, const Triangle
   if (routing.parts.empty()) return curves;
   for (const Strip& strip : StripFinder(target, features, lengths).strips(routing))
     if (is_in_parts(routing, strip.lost)) curves.push_back(strip.lost);
-  std::ranges::sort(curves);
-  curves.erase(std::unique(curves.begin(), curves.end()), curves.end());
+  sort_unique(curves);
   return curves;
 }
 
