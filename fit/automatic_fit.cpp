@@ -54,18 +54,10 @@ constexpr std::array kOtherGrids{0.93, 0.87, 0.8, 0.73};
 constexpr std::array kOtherFreeGrids{1.0, 0.87};
 /// Largest number of long edges that the first grid may lose: if it lost more, so did all others of five parts.
 constexpr std::size_t kMostLongLost = 2;
+/// Share of the area on planes from which on grids that are not through them are worse.
+constexpr double kMany = 0.4;
 /// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
 constexpr double kWorthRefining = 0.5;
-
-/// A grid that was brought near the target, and on which the edges were laid out.
-struct LaidOutGrid {
-  AutomaticFitTrial described;
-  TrialStart start;
-};
-
-bool is_same_grid(const AutomaticFitTrial& a, const AutomaticFitTrial& b) {
-  return a.template_cells == b.template_cells && a.through_planes == b.through_planes;
-}
 
 /// An automatic fit of one solid: the search among templates.
 class AutomaticFit : AutomaticSolidDriver {
@@ -81,18 +73,15 @@ class AutomaticFit : AutomaticSolidDriver {
   bool run_edges(const AutomaticAttempt& attempt);
   std::optional<AutoTemplate> make_grid(AutomaticAttempt::Kind kind, double cells);
   std::optional<AutomaticFitTrial> lay_out_on(AutoTemplate grid, AutomaticAttempt::Kind kind);
-  /// Lays out the edges on a grid again.
-  void take(const LaidOutGrid& grid);
   /// Returns the number of edges above `kLongEdgePercent` that the present layout does not follow.
   std::size_t num_long_lost() const;
-  bool try_other_grids(const AutomaticAttempt& attempt, double cells, AutomaticFitTrial& described);
+  bool try_other_grids(const AutomaticAttempt& attempt, double cells, const AutomaticFitTrial& first);
   bool run_graded();
   bool run_refined();
   bool fit_future_cage(RoutingOptions& routing);
   bool route_and_fit(const AutomaticFitTrial& described);
   bool is_worth_trying(const AutomaticAttempt& attempt) const {
-    // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
-    constexpr double kMany = 0.4;
+    // A grid without planes is the grid of the attempt before.
     return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
   /// Number of cells up to which a fit is refined, if the number is free.
@@ -115,7 +104,7 @@ class AutomaticFit : AutomaticSolidDriver {
   std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
   std::string refusal_;                    ///< why there was no template for the last attempt that had none
   std::optional<AutoTemplate> finest_;     ///< of the templates that were not refined, in the target's coordinates
-  double aligned_share_ = 0;               ///< of the target's area on planes of the last grid through planes
+  double aligned_share_ = 0;  ///< of the target's area on planes of the grid of the last attempt through planes
 };
 
 /// Fits a pillowed template. Returns false if the fit must end.
@@ -179,10 +168,7 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
 /// Makes a grid of about so many cells. Returns nothing as `make_template`.
 std::optional<AutoTemplate> AutomaticFit::make_grid(AutomaticAttempt::Kind kind, double cells) {
   const auto count = std::clamp(static_cast<std::size_t>(cells), kLeastTemplateCells, kMostTemplateCells);
-  const bool is_aligned = kind == AutomaticAttempt::Kind::aligned;
-  std::optional<AutoTemplate> made = make_template({.cells = count, .through_planes = is_aligned});
-  if (made && is_aligned) aligned_share_ = made->aligned_share;
-  return made;
+  return make_template({.cells = count, .through_planes = kind == AutomaticAttempt::Kind::aligned});
 }
 
 /// Brings a grid near the target and lays out the edges on it. Returns nothing if the fit must end.
@@ -194,45 +180,31 @@ std::optional<AutomaticFitTrial> AutomaticFit::lay_out_on(AutoTemplate grid, Aut
   return std::nullopt;
 }
 
-void AutomaticFit::take(const LaidOutGrid& grid) {
-  start_ = grid.start;
-  lay_out({});
-}
-
 std::size_t AutomaticFit::num_long_lost() const {
   return num_long_edges_lost(missed_edges(layout_->routing.unfollowed, target_.normalization));
 }
 
-/// Lays out the edges on other grids, if a few long ones are lost on the present grid, until none is; if none of the
-/// grids is like that, the first one is the present one again. Returns false if the fit must end.
-///
-/// cells      asked for the first grid.
-/// described  in: of the present layout; out: of the one that is taken.
-bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells, AutomaticFitTrial& described) {
+/// Lays out the edges on other grids, and fits the first one that loses no long edge. Returns false if the fit must
+/// end. cells  asked for the grid before.  first: how that was described.
+bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells, const AutomaticFitTrial& first) {
   using Kind = AutomaticAttempt::Kind;
-  if (num_long_lost() == 0 || num_long_lost() > kMostLongLost) return true;
   std::vector<std::pair<Kind, double>> others;
-  for (const double share : kOtherGrids) others.emplace_back(attempt.kind, share);
-  if (attempt.kind == Kind::aligned && aligned_share_ > 0)
+  for (const double share : kOtherGrids) others.emplace_back(Kind::aligned, share);
+  if (aligned_share_ >= kMany)  // else an attempt with such a grid follows
     for (const double share : kOtherFreeGrids) others.emplace_back(Kind::edges, share);
-  const LaidOutGrid first{described, start_};
-  std::set<std::pair<Kind, std::size_t>> seen{{attempt.kind, described.template_cells}};
+  std::set<std::pair<Kind, std::size_t>> seen{{Kind::aligned, first.template_cells}};
+  std::size_t num_grids = 1;
   for (const auto& [kind, share] : others) {
     std::optional<AutoTemplate> grid = make_grid(kind, share * cells);
     if (!grid && no_template_.empty()) return false;
     no_template_.clear();
     if (!grid || !seen.emplace(kind, grid->mesh.num_cells()).second) continue;
-    const std::optional<AutomaticFitTrial> other = lay_out_on(*std::move(grid), kind);
+    std::optional<AutomaticFitTrial> other = lay_out_on(*std::move(grid), kind);
     if (!other) return false;
-    ++described.grids;
+    other->grids = ++num_grids;
     const bool has_room = !options_.cells || layout_->patched.mesh.num_cells() <= attempt.template_cells;
-    if (!has_room || num_long_lost() > 0) continue;
-    const std::size_t grids = described.grids;
-    described = *other;
-    described.grids = grids;
-    return true;
+    if (has_room && num_long_lost() == 0) return route_and_fit(*other);
   }
-  take(first);
   return true;
 }
 
@@ -247,6 +219,7 @@ bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
   for (int trial = 1;; ++trial) {
     std::optional<AutoTemplate> grid = make_grid(attempt.kind, asked);
     if (!grid) return !no_template_.empty();
+    if (attempt.kind == AutomaticAttempt::Kind::aligned) aligned_share_ = grid->aligned_share;
     std::optional<AutomaticFitTrial> described = lay_out_on(*std::move(grid), attempt.kind);
     if (!described) return false;
     const std::size_t padded = layout_->patched.mesh.num_cells();
@@ -259,15 +232,11 @@ bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
       skipped_.push_back(attempt);
       return true;
     }
-    if (!attempt.is_last_count) return route_and_fit(*described);
-    const LaidOutGrid first{*described, start_};
-    if (!try_other_grids(attempt, asked, *described)) return false;
-    const std::size_t num_trials = result_.trials.size();
+    const std::size_t lost = num_long_lost();
     if (!route_and_fit(*described)) return false;
-    // A grid that loses no long edges may still be a poor one: then the first one is fitted as well.
-    if (is_same_grid(*described, first.described) || result_.chosen >= num_trials) return true;
-    take(first);
-    return route_and_fit(first.described);
+    const bool may_gain = attempt.is_last_count && attempt.kind == AutomaticAttempt::Kind::aligned && lost > 0 &&
+                          lost <= kMostLongLost && best().long_edges_lost > 0;
+    return !may_gain || try_other_grids(attempt, asked, *described);
   }
 }
 

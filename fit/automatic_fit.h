@@ -81,7 +81,7 @@ struct MissedEdge {
 struct AutomaticFitTrial {
   std::size_t template_cells = 0, cells = 0;
   bool through_planes = false;                  ///< the template's grid lines pass through planes of the target
-  std::size_t grids = 1;  ///< grids on which the edges were laid out, to find one that loses no long edges
+  std::size_t grids = 1;  ///< grids on which the edges were laid out until one lost no long edges; this is the last
   std::size_t refined_cells = 0;                ///< of the grid or mesh after some of its cells were cut; 0: none was
   std::size_t pads = 0;                         ///< layers of cells under patches between sharp edges
   std::size_t curves = 0, followed_curves = 0;  ///< of the target's sharp edges
@@ -129,8 +129,9 @@ struct AutomaticFitResult {
 /// lies where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted
 /// from the grid's positions, with creases, each patch against its own regions of the target. Edges at which cells stay
 /// poor are given up, and the rest is routed anew. A grid that is not through planes is tried, too, if less than 40 %
-/// of the target's area lies on them. If the last grid loses one or two edges longer than `kLongEdgePercent`, the edges
-/// are laid out on up to six others, and the first one that loses no such edge is fitted, or both are.
+/// of the target's area lies on them. If the grid of the largest number of cells loses one or two edges longer than
+/// `kLongEdgePercent`, the edges are laid out on up to six others, and the first one that loses no such edge is fitted
+/// as well.
 ///
 /// If no grid has the solid's topology, the next attempt has finer ones.
 ///

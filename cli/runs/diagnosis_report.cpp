@@ -112,10 +112,11 @@ std::optional<SurfaceRepair> repaired_with_copies(const std::filesystem::path& p
                                                   std::vector<std::string>& warnings) {
   std::vector<std::string> own_warnings;
   const TriangleMesh surface = triangulate(read_polygon_mesh(path, &own_warnings));
-  if (!touching_solids(surface, interrupted, rule)) return std::nullopt;
+  std::optional<TouchingSolids> solids = touching_solids(surface, interrupted, rule);
+  if (!solids) return std::nullopt;
   warnings.resize(told);
   warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
-  return repair_surface(surface, interrupted, rule);
+  return repair_of_solids(*std::move(solids));
 }
 
 /// Repairs a surface with the copies of triangles that the reader drops, if these tell more: two that face each other

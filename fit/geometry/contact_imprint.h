@@ -23,9 +23,13 @@ inline constexpr double kTouchingShare = 1e-5;
 /// surface    finite, with valid vertex numbers.
 /// cancelled  asked now and then, from the calling thread; if it returns true, nothing is returned. Empty: never.
 /// returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`. Nothing
-///            if no triangles lie on each other but those that have the same corners, or if there are too many. What
-///            crosses is not looked at: the result may cross as the surface does.
-/// Cost: that of the pairs of triangles whose boxes meet, and the square of the triangles in a cluster.
+///            if no triangles lie on each other but those that have the same corners; if a cluster does not lie in one
+///            plane, or two of its vertices are at one place of it; or if there are too many (3e8 tests of a point or a
+///            box). What crosses is not looked at: the result may cross as the surface does.
+/// Limit: a round contact may be refused if its rim bends by less than the distance from one vertex to the next but one,
+/// as that of a polygon of 256 sides does if its radius is below 3 % of the diagonal.
+/// Cost: that of the pairs of triangles whose boxes meet; in a cluster, that of pairs of edges whose boxes meet, and of
+/// each crossing with the vertices and crossings before it.
 std::optional<TriangleMesh> imprinted_contacts(const TriangleMesh& surface,
                                                const std::function<bool()>& cancelled = {});
 

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <span>
@@ -64,8 +65,9 @@ ContactBox contact_box(std::span<const Vec3> points, double margin, Index number
 
 using ContactCorners = std::array<Vec3, 3>;
 
-/// Returns true if triangles overlap, seen along the normal of the larger one, by more than a strip of width
-/// `distance`, and are within `distance` of its plane there.
+/// Returns true if triangles overlap, seen along the normal of the larger one, by more than a strip of width `distance`
+/// or than half of the smaller one, and are within `distance` of its plane there. The slivers at the rim of a round
+/// contact may be narrower than the distance; walls beside it overlap by little of their area.
 bool lie_on_each_other(const ContactCorners& a, const ContactCorners& b, double distance) {
   const auto area_vector = [](const ContactCorners& t) -> Vec3 { return (t[1] - t[0]).cross(t[2] - t[0]); };
   const Vec3 of_a = area_vector(a), of_b = area_vector(b);
@@ -95,8 +97,37 @@ bool lie_on_each_other(const ContactCorners& a, const ContactCorners& b, double 
     twice_area += (p - overlap[0]).cross(q - overlap[0]);
     length += (q - p).norm();
   }
-  return std::abs(twice_area.dot(normal)) > distance * length;
+  const double smaller = std::min(of_a.norm(), of_b.norm());
+  return std::abs(twice_area.dot(normal)) > std::min(distance * length, 0.5 * smaller);
 }
+
+/// Vertices by their coordinates.
+class VerticesInBoxes {
+ public:
+  VerticesInBoxes(std::span<const Index> vertices, std::span<const Vec3> positions) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const Index v : vertices) along_[axis].push_back({positions[v][axis], v});
+      std::ranges::sort(along_[axis]);
+    }
+  }
+
+  /// Returns the vertices between two planes, perpendicular to the axis along which there are the fewest, on both sides
+  /// of a box.
+  std::vector<Index> between(const Vec3& low, const Vec3& high) const {
+    std::span<const std::pair<double, Index>> least = along_[0];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto from = std::ranges::lower_bound(along_[axis], low[axis], {}, &std::pair<double, Index>::first);
+      const auto to = std::ranges::upper_bound(along_[axis], high[axis], {}, &std::pair<double, Index>::first);
+      if (static_cast<std::size_t>(to - from) <= least.size()) least = {from, to};
+    }
+    std::vector<Index> vertices;
+    for (const auto& [coordinate, v] : least) vertices.push_back(v);
+    return vertices;
+  }
+
+ private:
+  std::array<std::vector<std::pair<double, Index>>, 3> along_;
+};
 
 /// The triangles of a surface while clusters of them are replaced.
 class ContactImprint {
@@ -132,7 +163,9 @@ class ContactImprint {
   bool replace(const std::vector<Index>& cluster, std::vector<Piece>& pieces);
   void set_triangles(const std::vector<Piece>& pieces);
   std::vector<Index> on_edge(Index a, Index b, std::span<const Index> vertices) const;
+  std::vector<Index> near_edge(Index a, Index b, const VerticesInBoxes& vertices);
   const std::vector<Index>& inside(Index a, Index b);
+  std::vector<std::array<Index, 2>> near_pairs(const std::vector<ContactBox>& boxes);
 
   static constexpr std::size_t kMostTests = 300'000'000;  ///< of a point beside a triangle or edge: a second
 
@@ -140,7 +173,8 @@ class ContactImprint {
   double distance_;  ///< within which triangles touch
   std::size_t num_tests_ = 0;
   std::vector<std::vector<Index>> clusters_;
-  std::vector<Index> vertices_;                                ///< of clusters, ascending
+  std::vector<VerticesInBoxes> vertices_;                      ///< of each cluster that was replaced
+  std::map<Index, std::vector<std::size_t>> clusters_of_;      ///< places in vertices_ of each vertex of a cluster
   std::vector<Index> crossings_;                               ///< vertices at which edges of clusters cross
   std::map<std::array<Index, 2>, std::vector<Index>> inside_;  ///< vertices inside an edge, from its lower number on
 };
@@ -212,6 +246,15 @@ std::vector<Index> ContactImprint::on_edge(Index a, Index b, std::span<const Ind
   return sorted;
 }
 
+/// Returns some vertices, among them all that `on_edge` may return.
+std::vector<Index> ContactImprint::near_edge(Index a, Index b, const VerticesInBoxes& vertices) {
+  const Vec3 &p = mesh_.positions[a], &q = mesh_.positions[b];
+  const Vec3 margin = Vec3::Constant(2 * distance_);
+  std::vector<Index> near = vertices.between(p.cwiseMin(q) - margin, p.cwiseMax(q) + margin);
+  num_tests_ += near.size();
+  return near;
+}
+
 /// Returns where two edges without a common end cross, seen along an axis, as coordinates x and y.
 std::optional<std::array<double, 2>> ContactImprint::crossing_of(const std::array<Index, 2>& edge,
                                                                  const std::array<Index, 2>& other, int x,
@@ -259,33 +302,37 @@ bool ContactImprint::replace(const std::vector<Index>& cluster, std::vector<Piec
       vertices.push_back(a);
       edges.push_back({std::min(a, b), std::max(a, b)});
     }
-  const auto make_unique = [](auto& list) {
-    std::ranges::sort(list);
-    list.erase(std::unique(list.begin(), list.end()), list.end());
+  sort_unique(vertices);
+  sort_unique(edges);
+  const auto seen_box = [&](ContactCorners points, Index number) {  // as seen along the axis
+    for (Vec3& p : points) p[axis] = 0;
+    return contact_box(points, distance_, number);
   };
-  make_unique(vertices);
-  make_unique(edges);
-  num_tests_ += own.size() * own.size() + edges.size() * (edges.size() + vertices.size());
-  if (num_tests_ > kMostTests) return false;
+  std::vector<ContactBox> boxes;
+  for (const auto& [a, b] : edges) {
+    const Vec3 &p = mesh_.positions[a], &q = mesh_.positions[b];
+    boxes.push_back(seen_box({p, q, q}, static_cast<Index>(boxes.size())));
+  }
   // Crossings of edges become vertices here, one for all that are near each other: the triangulation makes several.
-  for (std::size_t i = 0; i < edges.size(); ++i)
-    for (std::size_t j = i + 1; j < edges.size(); ++j) {
-      const auto crossing = crossing_of(edges[i], edges[j], x, y);
-      if (!crossing) continue;
-      const Vec3 p = lifted((*crossing)[0], (*crossing)[1]);
-      num_tests_ += vertices.size() + crossings_.size();
-      if (num_tests_ > kMostTests) return false;
-      const auto is_near = [&](Index v) { return (mesh_.positions[v] - p).norm() <= distance_; };
-      if (std::ranges::any_of(vertices, is_near)) continue;
-      const auto known = std::ranges::find_if(crossings_, is_near);  // of another cluster with both edges
-      if (known == crossings_.end()) {
-        vertices.push_back(static_cast<Index>(mesh_.positions.size()));
-        crossings_.push_back(vertices.back());
-        mesh_.positions.push_back(p);
-      } else {
-        vertices.push_back(*known);
-      }
+  const std::vector<std::array<Index, 2>> pairs = near_pairs(boxes);
+  if (num_tests_ > kMostTests) return false;
+  for (const auto& [i, j] : pairs) {
+    const auto crossing = crossing_of(edges[i], edges[j], x, y);
+    if (!crossing) continue;
+    const Vec3 p = lifted((*crossing)[0], (*crossing)[1]);
+    num_tests_ += vertices.size() + crossings_.size();
+    if (num_tests_ > kMostTests) return false;
+    const auto is_near = [&](Index v) { return (mesh_.positions[v] - p).norm() <= distance_; };
+    if (std::ranges::any_of(vertices, is_near)) continue;
+    const auto known = std::ranges::find_if(crossings_, is_near);  // of another cluster with both edges
+    if (known == crossings_.end()) {
+      vertices.push_back(static_cast<Index>(mesh_.positions.size()));
+      crossings_.push_back(vertices.back());
+      mesh_.positions.push_back(p);
+    } else {
+      vertices.push_back(*known);
     }
+  }
   Overlay overlay;
   std::map<Index, Overlay::Vertex_handle> handles;
   for (const Index v : vertices) {
@@ -294,38 +341,64 @@ bool ContactImprint::replace(const std::vector<Index>& cluster, std::vector<Piec
     if (handle->info().value != kNoIndex) return false;  // two vertices at one place of the plane
     handle->info().value = v;
   }
+  const VerticesInBoxes all(vertices, mesh_.positions);
   for (const auto& [a, b] : edges) {
     Index last = a;
-    for (const Index v : on_edge(a, b, vertices)) {
+    for (const Index v : on_edge(a, b, near_edge(a, b, all))) {
       overlay.insert_constraint(handles[last], handles[v]);
       last = v;
     }
     overlay.insert_constraint(handles[last], handles[b]);
   }
+  std::vector<Index> numbers;
   for (auto v = overlay.finite_vertices_begin(); v != overlay.finite_vertices_end(); ++v) {
     if (v->info().value == kNoIndex) {
       v->info().value = static_cast<Index>(mesh_.positions.size());
       mesh_.positions.push_back(lifted(v->point().x(), v->point().y()));
     }
-    vertices_.push_back(v->info().value);
+    numbers.push_back(v->info().value);
   }
+  sort_unique(numbers);
+  for (const Index v : numbers) clusters_of_[v].push_back(vertices_.size());
+  vertices_.emplace_back(numbers, mesh_.positions);
   // Twice the signed area in the plane's coordinates.
   const auto area = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
     return (b[x] - a[x]) * (c[y] - a[y]) - (b[y] - a[y]) * (c[x] - a[x]);
   };
+  std::vector<std::array<Index, 3>> faces;
+  std::vector<Vec3> centers;
   for (auto f = overlay.finite_faces_begin(); f != overlay.finite_faces_end(); ++f) {
-    const std::array<Index, 3> corners{f->vertex(0)->info().value, f->vertex(1)->info().value,
-                                       f->vertex(2)->info().value};
-    const Vec3 center = (mesh_.positions[corners[0]] + mesh_.positions[corners[1]] + mesh_.positions[corners[2]]) / 3;
-    for (const Index t : own) {
-      const auto& [a, b, c] = mesh_.triangles[t];
-      const Vec3 &p = mesh_.positions[a], &q = mesh_.positions[b], &r = mesh_.positions[c];
-      const double sign = area(p, q, r) > 0 ? 1 : -1;
-      if (sign * area(p, q, center) <= 0 || sign * area(q, r, center) <= 0 || sign * area(r, p, center) <= 0) continue;
-      pieces.push_back({sign > 0 ? corners : std::array<Index, 3>{corners[0], corners[2], corners[1]}, t});
-    }
+    faces.push_back({f->vertex(0)->info().value, f->vertex(1)->info().value, f->vertex(2)->info().value});
+    const auto& [a, b, c] = faces.back();
+    centers.push_back((mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[c]) / 3);
   }
-  return true;
+  // A face becomes a piece of each triangle that its center is inside.
+  boxes.clear();
+  const auto num_own = static_cast<Index>(own.size());
+  for (const Index t : own) boxes.push_back(seen_box(corners(t), static_cast<Index>(boxes.size())));
+  for (const Vec3& center : centers)
+    boxes.push_back(seen_box({center, center, center}, static_cast<Index>(boxes.size())));
+  for (const auto& [i, j] : near_pairs(boxes)) {
+    if (i >= num_own || j < num_own) continue;
+    const Index t = own[i];
+    const auto& face = faces[j - num_own];
+    const Vec3& center = centers[j - num_own];
+    const auto [p, q, r] = corners(t);
+    const double sign = area(p, q, r) > 0 ? 1 : -1;
+    if (sign * area(p, q, center) <= 0 || sign * area(q, r, center) <= 0 || sign * area(r, p, center) <= 0) continue;
+    pieces.push_back({sign > 0 ? face : std::array<Index, 3>{face[0], face[2], face[1]}, t});
+  }
+  return num_tests_ <= kMostTests;
+}
+
+/// Returns the pairs of numbers of boxes that meet, the lower one first, ascending; none if there are too many.
+std::vector<std::array<Index, 2>> ContactImprint::near_pairs(const std::vector<ContactBox>& boxes) {
+  std::vector<std::array<Index, 2>> pairs;
+  for_each_meeting(boxes, [&](Index a, Index b) {
+    if (++num_tests_ <= kMostTests) pairs.push_back({std::min(a, b), std::max(a, b)});
+  });
+  std::ranges::sort(pairs);
+  return pairs;
 }
 
 void ContactImprint::set_triangles(const std::vector<Piece>& pieces) {
@@ -355,23 +428,28 @@ bool ContactImprint::replace_clusters() {
     return false;
   }
   set_triangles(pieces);
-  sort_unique(vertices_);
   return true;
 }
 
-/// Returns the vertices of clusters inside an edge, from its lower number on.
+/// Returns the vertices inside an edge, from its lower number on, of the clusters that both ends are in.
 const std::vector<Index>& ContactImprint::inside(Index a, Index b) {
   const auto [it, is_new] = inside_.try_emplace({std::min(a, b), std::max(a, b)});
   if (!is_new) return it->second;
-  num_tests_ += vertices_.size();
-  return it->second = on_edge(it->first[0], it->first[1], vertices_);
+  const auto of_a = clusters_of_.find(a), of_b = clusters_of_.find(b);
+  if (of_a == clusters_of_.end() || of_b == clusters_of_.end()) return it->second;
+  std::vector<std::size_t> common;
+  std::ranges::set_intersection(of_a->second, of_b->second, std::back_inserter(common));
+  std::vector<Index> vertices;
+  for (const std::size_t cluster : common)
+    std::ranges::copy(near_edge(a, b, vertices_[cluster]), std::back_inserter(vertices));
+  sort_unique(vertices);
+  return it->second = on_edge(it->first[0], it->first[1], vertices);
 }
 
 bool ContactImprint::cut_at_vertices() {
   constexpr std::size_t kMostPieces = 10'000'000;
   std::vector<Piece> whole, left;
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) left.push_back({mesh_.triangles[t], static_cast<Index>(t)});
-  const auto is_of_cluster = [&](Index v) { return std::ranges::binary_search(vertices_, v); };
   while (!left.empty()) {
     if (num_tests_ > kMostTests || whole.size() + left.size() > kMostPieces) return false;
     const Piece piece = left.back();
@@ -383,7 +461,7 @@ bool ContactImprint::cut_at_vertices() {
     for (std::size_t e = 0; e < 3; ++e) {
       const auto [a, b] = std::minmax({piece.corners[e], piece.corners[(e + 1) % 3]});
       // An edge on which a vertex of a cluster lies is one of the cluster.
-      if (!is_of_cluster(a) || !is_of_cluster(b) || inside(a, b).empty()) continue;
+      if (inside(a, b).empty()) continue;
       is_sliver = is_sliver || std::ranges::find(inside(a, b), piece.corners[(e + 2) % 3]) != inside(a, b).end();
       if (least && *least < std::array{a, b}) continue;
       least = {a, b};

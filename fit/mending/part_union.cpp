@@ -21,22 +21,40 @@ PartUnion::PartUnion(SurfaceParts parts, const std::function<bool()>& cancelled)
   turn_parts_outward(parts_, nesting_);
   triangles_of_.resize(parts_.num_parts());
   for (std::size_t t = 0; t < parts_.part.size(); ++t) triangles_of_[parts_.part[t]].push_back(static_cast<Index>(t));
+  find_names();
 }
 
-std::string PartUnion::name_of(std::size_t p) const {
+void PartUnion::find_names() {
   const FaceGroups& groups = mesh().face_groups;
-  if (groups.empty()) return "";
-  const Index first = groups.of_face[triangles_of_[p].front()];
-  const auto is_same = [&](Index t) { return groups.of_face[t] == first; };
-  return first != kNoIndex && std::ranges::all_of(triangles_of_[p], is_same) ? groups.groups[first].name : "";
+  names_.resize(parts_.num_parts());
+  if (groups.empty()) return;
+  for (std::size_t p = 0; p < names_.size(); ++p) {
+    const Index first = groups.of_face[triangles_of_[p].front()];
+    const auto is_same = [&](Index t) { return groups.of_face[t] == first; };
+    if (first != kNoIndex && std::ranges::all_of(triangles_of_[p], is_same)) names_[p] = groups.groups[first].name;
+  }
 }
 
 std::string PartUnion::text_of(const Meeting& meeting) const {
   const auto text = [&](std::size_t p) {
-    const std::string name = name_of(p);
-    return std::to_string(p) + (name.empty() ? "" : " (" + name + ")");
+    return std::to_string(p) + (names_[p].empty() ? "" : " (" + names_[p] + ")");
   };
   return "parts " + text(meeting.a) + " and " + text(meeting.b) + " meet at " + to_text(meeting.place);
+}
+
+/// Says which parts are united, and why they are no regions though they have names: with the place of a crossing, if
+/// there is one.
+std::string PartUnion::text_of(std::span<const Meeting> meetings, std::size_t num_parts) const {
+  const auto crossing = std::ranges::find_if(meetings, &Meeting::crosses);
+  const bool have_names = std::ranges::any_of(meetings, [&](const Meeting& meeting) {
+    return !names_[meeting.a].empty() && !names_[meeting.b].empty() && names_[meeting.a] != names_[meeting.b];
+  });
+  std::string text = text_of(crossing == meetings.end() ? meetings.front() : *crossing) + "; " +
+                     std::to_string(num_parts) + " parts that cross, overlap or touch are united";
+  if (have_names)
+    text += crossing == meetings.end() ? " (they are no regions: their faces cannot be cut along each other)"
+                                       : " (named solids are regions only if they touch and do not cross)";
+  return text;
 }
 
 bool PartUnion::group() {
@@ -51,7 +69,7 @@ bool PartUnion::group() {
     };
     const TriangleMeeting meeting = meeting_of(corners(t), corners(s));
     if (!is_contact && meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) return;
-    meetings_.push_back({a, b, meeting.place});
+    meetings_.push_back({a, b, meeting.place, meeting.kind == MeetingKind::crossing});
     groups_.join(static_cast<Index>(a), static_cast<Index>(b));
   };
   for (const auto& [t, s] : found.pairs) join(t, s, false);
@@ -112,12 +130,7 @@ std::optional<TriangleMesh> PartUnion::made(std::vector<std::string>& done) {
     result.positions.insert(result.positions.end(), one->positions.begin(), one->positions.end());
     for (const auto& [a, b, c] : one->triangles) result.triangles.push_back({first + a, first + b, first + c});
     if (is_alone) continue;
-    const bool have_names = std::ranges::any_of(meetings[p], [&](const Meeting& meeting) {
-      return !name_of(meeting.a).empty() && !name_of(meeting.b).empty() && name_of(meeting.a) != name_of(meeting.b);
-    });
-    done.push_back("target: " + text_of(meetings[p].front()) + "; " + std::to_string(members[p].size()) +
-                   " parts that cross or overlap are united" +
-                   (have_names ? " (named solids are regions only if they touch and do not cross)" : ""));
+    done.push_back("target: " + text_of(meetings[p], members[p].size()));
   }
   return result;
 }

@@ -30,6 +30,7 @@ class PartUnion {
   struct Meeting {
     std::size_t a, b;  ///< parts
     Vec3 place;
+    bool crosses;  ///< else the parts touch
   };
   const TriangleMesh& mesh() const { return parts_.surface.mesh; }
   std::size_t root(std::size_t p) { return static_cast<std::size_t>(groups_.of(static_cast<Index>(p))); }
@@ -38,9 +39,10 @@ class PartUnion {
   /// members  parts, ascending.  meetings: those among them.
   std::optional<TriangleMesh> united_group(std::span<const std::size_t> members,
                                            std::span<const Meeting> meetings) const;
-  /// Returns the name of the group that a part's triangles are in; empty if there is none, or there are several.
-  std::string name_of(std::size_t p) const;
+  /// Finds the names of the groups that the parts' triangles are in.
+  void find_names();
   std::string text_of(const Meeting& meeting) const;
+  std::string text_of(std::span<const Meeting> meetings, std::size_t num_parts) const;
 
   SurfaceParts parts_;
   PartNesting nesting_;
@@ -48,6 +50,7 @@ class PartUnion {
   DisjointSets groups_;                           ///< of parts that are to be united
   std::vector<Meeting> meetings_;                 ///< those that joined groups
   std::vector<std::vector<Index>> triangles_of_;  ///< of each part, ascending
+  std::vector<std::string> names_;                ///< of each part; empty if it has none, or is in several groups
 };
 
 }  // namespace subvol::internal

@@ -239,18 +239,6 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
 }
 
-/// Returns the repair of named solids that touch; nothing if the surface is another one.
-std::optional<SurfaceRepair> repaired_solids(const TriangleMesh& given, const std::function<bool()>& cancelled,
-                                             RegionRule rule) {
-  std::optional<TouchingSolids> solids = touching_solids(given, cancelled, rule);
-  if (!solids) return std::nullopt;
-  SurfaceRepair repair{.surface = std::move(solids->surface), .is_fillable = true};
-  repair.done.push_back("target: " + solids->text());
-  for (const std::string& note : solids->regions.notes) repair.notes.push_back("target: " + note);
-  repair.regions = std::move(solids->regions);
-  return repair;
-}
-
 /// Returns the surface with contacts of faces that are cut into equal triangles, if sheets or parts make regions and
 /// nothing else is in the way of telling them apart.
 std::optional<TriangleMesh> with_common_contacts(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
@@ -268,7 +256,8 @@ std::optional<TriangleMesh> with_common_contacts(const TriangleMesh& given, cons
 
 /// `repair_surface`, whose result counts only if it was not cancelled.
 SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
-  if (std::optional<SurfaceRepair> repair = repaired_solids(given, cancelled, rule)) return std::move(*repair);
+  if (std::optional<TouchingSolids> solids = touching_solids(given, cancelled, rule))
+    return repair_of_solids(*std::move(solids));
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
   if (rule != RegionRule::keep && diagnosis.find(SurfaceFault::face_contact))
@@ -318,6 +307,14 @@ SurfaceRepair repaired(const TriangleMesh& given, const std::function<bool()>& c
 }
 
 }  // namespace
+
+SurfaceRepair internal::repair_of_solids(TouchingSolids solids) {
+  SurfaceRepair repair{.surface = std::move(solids.surface), .is_fillable = true};
+  repair.done.push_back("target: " + solids.text());
+  for (const std::string& note : solids.regions.notes) repair.notes.push_back("target: " + note);
+  repair.regions = std::move(solids.regions);
+  return repair;
+}
 
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
   if (!cancelled) return repaired(given, {}, rule);

@@ -61,6 +61,12 @@ struct SurfaceRepair {
 SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
                              RegionRule rule = RegionRule::automatic);
 
+namespace internal {
+struct TouchingSolids;
+/// Returns what `repair_surface` returns for a surface in which these solids were found.
+SurfaceRepair repair_of_solids(TouchingSolids solids);
+}  // namespace internal
+
 /// Returns why grids with up to `kMostTemplateGrowth` times a number of cells do not have the topology of a surface's
 /// solid: that they do not, and each cause that the diagnosis of the surface holds, with its place.
 std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted);

@@ -13,6 +13,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +39,25 @@ class Boxes {
       mesh_.triangles.push_back({a, b, has_other_diagonals ? d : c});
       mesh_.triangles.push_back({has_other_diagonals ? b : a, c, d});
       for (int i = 0; i < 2; ++i) of_face_.push_back(group);
+    }
+    return *this;
+  }
+  /// Adds a prism over a regular polygon, whose ends are fans of triangles.
+  Boxes& add_prism(const std::string& name, const Vec3& center, double radius, double height, int sides) {
+    const auto first = static_cast<Index>(mesh_.positions.size());
+    for (const double z : {0.0, height})
+      for (int k = 0; k < sides; ++k) {
+        const double angle = 2 * std::numbers::pi * k / sides;
+        mesh_.positions.push_back(center + Vec3(radius * std::cos(angle), radius * std::sin(angle), z));
+      }
+    const auto add_triangle = [&](Index a, Index b, Index c) {
+      mesh_.triangles.push_back({first + a, first + b, first + c});
+      of_face_.push_back(groups_.by_name(name));
+    };
+    for (Index k = 0; k < sides; ++k) {
+      const Index next = (k + 1) % sides;
+      add_triangle(k, next, sides + next), add_triangle(k, sides + next, sides + k);
+      if (k > 0 && next > 0) add_triangle(0, next, k), add_triangle(sides, sides + k, sides + next);
     }
     return *this;
   }
@@ -65,6 +86,33 @@ std::map<std::string, double> volumes_of(const RegionSurface& regions) {
 }
 
 }  // namespace
+
+TEST_CASE("The slivers at the rim of a fine round contact are part of it", "[target][regions]") {
+  const int sides = 256;
+  const double radius = GENERATE(0.2, 0.3);
+  Boxes boxes;
+  boxes.add("plate", {0, 0, 0}, {4, 4, 1}).add_prism("bolt", {1.7, 1.7, 1}, radius, 1, sides);
+  const std::optional<TouchingSolids> solids = touching_solids(boxes.surface());
+  REQUIRE(solids);
+  const auto volumes = volumes_of(solids->regions);
+  const double angle = 2 * std::numbers::pi / sides;
+  CHECK(volumes.at("plate") == Approx(16));
+  CHECK(volumes.at("bolt") == Approx(sides * 0.5 * radius * radius * std::sin(angle)).epsilon(1e-3));
+}
+
+TEST_CASE("The cost of many contacts is not quadratic in their number", "[target][regions]") {
+  Boxes boxes;
+  const int pairs = 1200;
+  for (int i = 0; i < pairs; ++i) {
+    const std::string number = std::to_string(i);
+    const Vec3 at(5.0 * i, 0, 0);
+    boxes.add("p" + number, at, at + Vec3(2, 2, 1));
+    boxes.add("q" + number, at + Vec3(0.5, 0.5, 1), at + Vec3(1.5, 1.5, 2), true);
+  }
+  const std::optional<TouchingSolids> solids = touching_solids(boxes.surface());
+  REQUIRE(solids);
+  CHECK(solids->regions.regions.size() == 2 * pairs);
+}
 
 TEST_CASE("Named solids that touch become regions of their names", "[target][regions]") {
   const TriangleMesh surface = bolt_on_plate();
