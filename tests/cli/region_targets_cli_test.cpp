@@ -119,7 +119,7 @@ TEST_CASE("Named solids of an STL or 3MF become regions of their names", "[cli][
     CHECK(has(check.out, "4 solids touch: they become the regions plate, cork, block and pin"));
     CHECK(has(check.out, "a fit fills it:     as 4 regions"));
   }
-  const Run fit = place.run("fit mount.stl --cells 500 -o a.mesh --report a.json");
+  const Run fit = place.run("fit mount.stl --cells 3000 -o a.mesh --report a.json");
   CAPTURE(fit.err);
   REQUIRE(fit.status == 0);
   CHECK(has(fit.err, "4 solids touch"));
