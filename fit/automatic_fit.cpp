@@ -52,7 +52,7 @@ constexpr int kMostRoutings = 5;
 /// last.
 constexpr std::array kOtherGrids{0.93, 0.87, 0.8, 0.73};
 constexpr std::array kOtherFreeGrids{1.0, 0.87};
-/// Largest number of long edges that the first grid may lose: if it lost more, so did all others of five parts.
+/// Largest number of long edges that the first grid may lose. Of five parts that lost more, no other grid lost none.
 constexpr std::size_t kMostLongLost = 2;
 /// Share of the area on planes from which on grids that are not through them are worse.
 constexpr double kMany = 0.4;
@@ -185,7 +185,10 @@ std::size_t AutomaticFit::num_long_lost() const {
 }
 
 /// Lays out the edges on other grids, and fits the first one that loses no long edge. Returns false if the fit must
-/// end. cells  asked for the grid before.  first: how that was described.
+/// end.
+///
+/// cells  that were asked for the first grid.
+/// first  describes the trials of that grid.
 bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells, const AutomaticFitTrial& first) {
   using Kind = AutomaticAttempt::Kind;
   std::vector<std::pair<Kind, double>> others;

@@ -11,7 +11,7 @@ namespace subvol {
 
 // To curve an existing mesh, use it as the template of a high-order fit with kCurvingLambda (`fit_high_order`).
 
-/// What was done to the cells of a mesh before it is fitted.
+/// Says how the cells of a mesh were changed before a fit.
 struct UntangledStart {
   std::size_t tangled = 0;  ///< number of cells that were not certified
   std::size_t left = 0;     ///< number of cells still not certified when the work was ended early

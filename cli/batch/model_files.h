@@ -13,7 +13,8 @@ namespace subvol::cli {
 /// Fingerprints of the files that a model reads.
 struct ModelFiles {
   std::string hash;  ///< of their contents
-  /// Of their sizes and times of change; empty: a file changed so lately that its time may not tell a later change.
+  /// A hash of the sizes and times of change. It is empty if a file changed so lately that its time may not tell a
+  /// later change.
   std::string stamp;
 };
 

@@ -25,7 +25,8 @@ inline constexpr double kTouchingShare = 1e-5;
 /// returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`. Nothing
 ///            if no triangles lie on each other but those that have the same corners; if a cluster does not lie in one
 ///            plane, or two of its vertices are at one place of it; or if there are too many (3e8 tests of a point or a
-///            box). What crosses is not looked at: the result may cross as the surface does.
+///            box, 3e7 pairs of boxes that meet in a cluster). What crosses is not looked at: the result may cross as
+///            the surface does.
 /// Limit: a round contact may be refused if its rim bends by less than the distance from one vertex to the next but
 /// one, as that of a polygon of 256 sides does if its radius is below 3 % of the diagonal.
 /// Cost: that of the pairs of triangles whose boxes meet; in a cluster, that of pairs of edges whose boxes meet, and of

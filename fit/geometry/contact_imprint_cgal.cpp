@@ -391,11 +391,14 @@ bool ContactImprint::replace(const std::vector<Index>& cluster, std::vector<Piec
   return num_tests_ <= kMostTests;
 }
 
-/// Returns the pairs of numbers of boxes that meet, the lower one first, ascending; none if there are too many.
+/// Returns the pairs of numbers of boxes that meet, the lower one first, ascending. If there are too many, it returns
+/// some of them, and raises the number of tests above its limit.
 std::vector<std::array<Index, 2>> ContactImprint::near_pairs(const std::vector<ContactBox>& boxes) {
+  constexpr std::size_t kMostPairs = 30'000'000;  // 240 MB
   std::vector<std::array<Index, 2>> pairs;
   for_each_meeting(boxes, [&](Index a, Index b) {
-    if (++num_tests_ <= kMostTests) pairs.push_back({std::min(a, b), std::max(a, b)});
+    num_tests_ += pairs.size() < kMostPairs ? 1 : kMostTests;
+    if (num_tests_ <= kMostTests) pairs.push_back({std::min(a, b), std::max(a, b)});
   });
   std::ranges::sort(pairs);
   return pairs;
@@ -454,7 +457,8 @@ bool ContactImprint::cut_at_vertices() {
     if (num_tests_ > kMostTests || whole.size() + left.size() > kMostPieces) return false;
     const Piece piece = left.back();
     left.pop_back();
-    // Of several edges, that of the least vertices is cut first, so that equal triangles have equal pieces.
+    // If several edges are to be cut, the one with the least vertex numbers is cut first: equal triangles then have
+    // equal pieces.
     std::optional<std::array<Index, 2>> least;
     std::size_t at = 0;
     bool is_sliver = false;  // its apex lies on its longest edge

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kChamfer = 0.15;
 
-/// The cube [-1, 1]^3 with a chamfer along the edges of its top.
+/// Returns the cube [-1, 1]^3 with a chamfer along the edges of its top.
 TriangleMesh chamfered_cube() {
   TriangleMesh mesh;
   const double x[] = {-1, 1, 1, -1}, y[] = {-1, -1, 1, 1};
@@ -35,7 +35,7 @@ TriangleMesh chamfered_cube() {
   return mesh;
 }
 
-/// The same cube with a chamfer along one edge of its top that starts with no width at (-1, -1, 1).
+/// Returns the same cube with a chamfer along one edge of its top. The chamfer has no width at (-1, -1, 1).
 TriangleMesh cube_with_taper() {
   TriangleMesh mesh;
   mesh.positions = {{-1, -1, -1},          {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},         {-1, -1, 1},

@@ -126,7 +126,7 @@ TEST_CASE("Named solids that touch become regions of their names", "[target][reg
   CHECK(repair.done[0] ==
         "target: 2 solids touch: they become the regions plate and bolt; "
         "--regions merge makes one of them");
-  // What was repaired has the same regions again.
+  // A second repair finds the same regions.
   const auto again = find_regions(repair.surface);
   REQUIRE(again);
   CHECK(again->volumes == repair.regions->volumes);
