@@ -417,10 +417,12 @@ HighOrderFitResult HighOrderFit::concluded(const Work& work) {
 
 namespace {
 
-/// Fits cells to a target, with its interfaces if they have the same regions. fit: does so for one target.
+/// Fits cells to a target, with its interfaces if they have the same regions.
+/// control: of the fit.  fit: fits the cells to one target.
 template <class Fit>
-HighOrderFitResult fit_matched(const TriangleMesh& target, const VolumeMesh& cells, const Fit& fit) {
-  const MatchedTarget matched = matched_target(target, cells);
+HighOrderFitResult fit_matched(const TriangleMesh& target, const VolumeMesh& cells, const SolveControl& control,
+                               const Fit& fit) {
+  const MatchedTarget matched = matched_target(target, cells, control.cancelled);
   if (matched.regions) return fit(FitTarget(*matched.regions));
   HighOrderFitResult result = fit(FitTarget(matched.outer ? *matched.outer : target));
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
@@ -431,7 +433,7 @@ HighOrderFitResult fit_matched(const TriangleMesh& target, const VolumeMesh& cel
 
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options) {
-  return fit_matched(target, template_mesh,
+  return fit_matched(target, template_mesh, options.control,
                      [&](FitTarget matched) { return HighOrderFit(std::move(matched), template_mesh, options).run(); });
 }
 
@@ -446,7 +448,7 @@ HighOrderFitResult fit_high_order(const TriangleMesh& target, const HighOrderMes
   cells.face_groups = labels.face_groups;
   HighOrderFitOptions options = given;
   options.basis = start.space.basis();
-  return fit_matched(target, cells, [&](FitTarget matched) {
+  return fit_matched(target, cells, options.control, [&](FitTarget matched) {
     return HighOrderFit(std::move(matched), cells, options).run_from(start);
   });
 }

@@ -255,7 +255,7 @@ FitResult SubdivisionFit::run() {
 
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {
-  const MatchedTarget matched = matched_target(target, template_mesh);
+  const MatchedTarget matched = matched_target(target, template_mesh, options.control.cancelled);
   if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, options).run();
   auto result = SubdivisionFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);

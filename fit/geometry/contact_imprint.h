@@ -29,8 +29,7 @@ inline constexpr double kTouchingShare = 1e-5;
 ///            the surface does.
 /// Limit: a round contact may be refused if its rim bends by less than the distance from one vertex to the next but
 /// one, as that of a polygon of 256 sides does if its radius is below 3 % of the diagonal.
-/// Cost: that of the pairs of triangles whose boxes meet; in a cluster, that of pairs of edges whose boxes meet, and of
-/// each crossing with the vertices and crossings before it.
+/// Cost: that of the pairs of triangles whose boxes meet and, in a cluster, of edges whose boxes meet.
 std::optional<TriangleMesh> imprinted_contacts(const TriangleMesh& surface,
                                                const std::function<bool()>& cancelled = {});
 

@@ -22,8 +22,10 @@ namespace {
 
 /// Returns so many regions of a target, if that is the number that a rule finds. Whatever the mesh fills is no void, so
 /// closed parts that face inward may be regions, too.
-std::optional<RegionSurface> find_so_many_regions(const TriangleMesh& target, std::size_t count) {
-  if (std::optional<TouchingSolids> solids = touching_solids(target); solids && solids->regions.regions.size() == count)
+std::optional<RegionSurface> find_so_many_regions(const TriangleMesh& target, std::size_t count,
+                                                  const std::function<bool()>& cancelled) {
+  if (std::optional<TouchingSolids> solids = touching_solids(target, cancelled);
+      solids && solids->regions.regions.size() == count)
     return std::move(solids->regions);
   for (const RegionRule rule : {RegionRule::automatic, RegionRule::keep})
     if (std::optional<RegionSurface> regions = find_regions(target, rule); regions && regions->regions.size() == count)
@@ -60,11 +62,12 @@ bool has_cavity(const VolumeMesh& mesh) {
 
 }  // namespace
 
-std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh) {
+std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh,
+                                           const std::function<bool()>& cancelled) {
   constexpr double kInside = 0.5;  // winding number: halfway between outside, 0, and inside, 1
   const std::vector<int> references = region_references(mesh);
   if (references.size() < 2) return std::nullopt;
-  std::optional<RegionSurface> regions = find_so_many_regions(target, references.size());
+  std::optional<RegionSurface> regions = find_so_many_regions(target, references.size(), cancelled);
   if (!regions) return std::nullopt;
   std::vector<Vec3> centers;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -94,15 +97,16 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
   return regions;
 }
 
-MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh) {
+MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                             const std::function<bool()>& cancelled) {
   const auto is_vertex = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < template_mesh.num_vertices(); };
   if (!std::ranges::all_of(template_mesh.cell_vertices, is_vertex)) return {};  // the fit refuses it
-  MatchedTarget matched{.regions = regions_as_in(target, template_mesh), .outer = {}, .warning = {}};
+  MatchedTarget matched{.regions = regions_as_in(target, template_mesh, cancelled), .outer = {}, .warning = {}};
   if (matched.regions) {
     matched.outer = outer_surface(*matched.regions);
     return matched;
   }
-  std::optional<TouchingSolids> solids = touching_solids(target);
+  std::optional<TouchingSolids> solids = touching_solids(target, cancelled);
   const std::optional<RegionSurface> others = solids ? std::optional(std::move(solids->regions)) : find_regions(target);
   if (!others || has_cavity(template_mesh)) return matched;
   matched.outer = outer_surface(*others);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/touching_solids.h"
 
+#include "subvol/fit/geometry/contact_imprint.h"
 #include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/target/region_matching.h"
 #include "subvol/surface/named_solids.h"
@@ -61,6 +62,29 @@ class Boxes {
     }
     return *this;
   }
+  /// Adds a unit cube whose faces are squares, n x n of them at the bottom and the top, and 1 x n at the sides.
+  Boxes& add_divided(const std::string& name, const Vec3& low, int n) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int end : {0, 1}) {
+        const int i = (axis + 1) % 3, j = (axis + 2) % 3, rows = i == 2 ? 1 : n, columns = j == 2 ? 1 : n;
+        for (int k = 0; k < rows * columns; ++k) {
+          const auto corner = [&](int of_row, int of_column) {
+            Vec3 p = low;
+            p[axis] += end;
+            p[i] += static_cast<double>(k / columns + of_row) / rows;
+            p[j] += static_cast<double>(k % columns + of_column) / columns;
+            mesh_.positions.push_back(p);
+            return static_cast<Index>(mesh_.positions.size() - 1);
+          };
+          std::array<Index, 4> square{corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)};
+          if (end == 0) std::swap(square[1], square[3]);
+          const auto [a, b, c, d] = square;
+          mesh_.triangles.insert(mesh_.triangles.end(), {{a, b, c}, {a, c, d}});
+          of_face_.insert(of_face_.end(), 2, groups_.by_name(name));
+        }
+      }
+    return *this;
+  }
   TriangleMesh surface() const {
     TriangleMesh mesh = mesh_;
     if (!groups_.groups().empty()) mesh.face_groups = {groups_.groups(), of_face_};
@@ -112,6 +136,31 @@ TEST_CASE("The cost of many contacts is not quadratic in their number", "[target
   const std::optional<TouchingSolids> solids = touching_solids(boxes.surface());
   REQUIRE(solids);
   CHECK(solids->regions.regions.size() == 2 * pairs);
+}
+
+TEST_CASE("A contact may have many crossings of edges", "[target][regions]") {
+  const Boxes boxes = Boxes().add_divided("lower", {0, 0, 0}, 48).add_divided("upper", {0, 0, 1}, 49);
+  const std::optional<TouchingSolids> solids = touching_solids(boxes.surface());
+  REQUIRE(solids);
+  const auto volumes = volumes_of(solids->regions);
+  CHECK(volumes.at("lower") == Approx(1));
+  CHECK(volumes.at("upper") == Approx(1));
+}
+
+TEST_CASE("A search for contacts can be cancelled in each of its steps", "[target][regions]") {
+  const Boxes boxes = Boxes().add_divided("lower", {0, 0, 0}, 18).add_divided("upper", {0, 0, 1}, 19);
+  const TriangleMesh surface = boxes.surface();
+  int questions = 0;
+  REQUIRE(imprinted_contacts(surface, [&] {
+    ++questions;
+    return false;
+  }));
+  REQUIRE(questions > 3);
+  for (int last = 0; last < questions; ++last) {
+    int asked = 0;
+    CHECK_FALSE(imprinted_contacts(surface, [&] { return asked++ == last; }));
+    CHECK(asked == last + 1);
+  }
 }
 
 TEST_CASE("Named solids that touch become regions of their names", "[target][regions]") {

@@ -1,88 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/mending/near_vertices.h"
+#include "subvol/fit/geometry/near_vertices.h"
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/sort_unique.h"
+#include "subvol/fit/geometry/vertex_grid.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <numeric>
 #include <set>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 
 namespace subvol::internal {
 
 namespace {
-
-/// Vertices in the cells of a grid, for finding those near a point.
-class VertexGrid {
- public:
-  VertexGrid(std::span<const Vec3> positions, std::span<const Index> vertices, double distance)
-      : positions_(positions), distance_(distance), next_(positions.size(), kNoIndex) {
-    constexpr double kCellSize = 4;          // distances: a ball meets 3.4 cells on average
-    constexpr double kLeastCellSize = 1e-9;  // share of the extent, so that numbers of cells fit into an integer
-    Eigen::AlignedBox3d box;
-    for (const Index v : vertices) box.extend(positions[v]);
-    low_ = box.min();
-    cell_ = std::max(kCellSize * distance, kLeastCellSize * box.sizes().maxCoeff());
-    first_.reserve(vertices.size());
-  }
-  /// False if the vertices lie too far apart for numbers, or all in one place.
-  bool is_usable() const { return std::isfinite(cell_) && cell_ > 0; }
-
-  void add(Index v) {
-    const Cell at = cell_of(positions_[v]);
-    const auto [found, is_new] = first_.try_emplace(key(at), v);
-    if (!is_new) {
-      next_[v] = found->second;
-      found->second = v;
-    }
-  }
-
-  /// Calls visit(vertex) for all vertices in cells that a ball of the distance's radius meets, and maybe some others.
-  template <class Visit>
-  void for_each_near(const Vec3& point, const Visit& visit) const {
-    const Vec3 reach = Vec3::Constant(distance_);
-    const Cell low = cell_of(point - reach), high = cell_of(point + reach);
-    for (std::int64_t i = low[0]; i <= high[0]; ++i)
-      for (std::int64_t j = low[1]; j <= high[1]; ++j)
-        for (std::int64_t k = low[2]; k <= high[2]; ++k) {
-          const auto found = first_.find(key({i, j, k}));
-          if (found == first_.end()) continue;
-          for (Index v = found->second; v != kNoIndex; v = next_[v]) visit(v);
-        }
-  }
-
- private:
-  using Cell = std::array<std::int64_t, 3>;
-  Cell cell_of(const Vec3& p) const {
-    Cell cell;
-    for (int k = 0; k < 3; ++k) cell[k] = static_cast<std::int64_t>(std::floor((p[k] - low_[k]) / cell_));
-    return cell;
-  }
-  /// A number of a cell, of which equal ones are rare.
-  static std::uint64_t key(const Cell& cell) {
-    std::uint64_t key = 0;
-    for (const std::int64_t number : cell) {
-      key = (key ^ static_cast<std::uint64_t>(number)) * 0x9e3779b97f4a7c15ULL;
-      key ^= key >> 32;
-    }
-    return key;
-  }
-
-  std::span<const Vec3> positions_;
-  double distance_, cell_ = 0;
-  Vec3 low_ = Vec3::Zero();
-  std::unordered_map<std::uint64_t, Index> first_;  ///< vertex of each cell that was added last
-  std::vector<Index> next_;                         ///< the one that was added before, for each vertex
-};
 
 /// Ways along the rims of a surface.
 class RimWays {
@@ -139,6 +74,12 @@ class RimWays {
 constexpr std::size_t kMostComparisons = 300'000'000;
 constexpr std::size_t kWayCost = 50;  ///< of a vertex that a way along rims passes, in comparisons
 
+VertexGrid grid_for(std::span<const Vec3> positions, std::span<const Index> vertices, double distance) {
+  Eigen::AlignedBox3d box;
+  for (const Index v : vertices) box.extend(positions[v]);
+  return {box, distance};
+}
+
 std::vector<Index> own_numbers(std::size_t count) {
   std::vector<Index> number(count);
   std::iota(number.begin(), number.end(), 0);
@@ -182,7 +123,7 @@ bool CrackSets::find_pairs() {
   std::vector<Index> vertices;
   for (const auto& edge : rims_) vertices.insert(vertices.end(), edge.begin(), edge.end());
   sort_unique(vertices);
-  VertexGrid before(positions_, vertices, distance_);
+  VertexGrid before = grid_for(positions_, vertices, distance_);
   if (!before.is_usable()) return false;
   std::size_t cost = 0;
   std::vector<NearPair> near;
@@ -193,7 +134,7 @@ bool CrackSets::find_pairs() {
       const double apart = (positions_[w] - positions_[v]).norm();
       if (apart <= distance_) near.push_back({apart, w, v});
     });
-    before.add(v);
+    before.add(v, positions_[v]);
     if (near.empty()) continue;
     const std::vector<Index> close = ways_.close_to(v, distance_, [](Index w) { return std::array<Index, 1>{w}; });
     cost += kWayCost * close.size();
@@ -230,7 +171,7 @@ void CrackSets::join_pairs() {
 
 std::vector<Index> near_vertices(std::span<const Vec3> positions, std::span<const Index> vertices, double distance) {
   std::vector<Index> number = own_numbers(positions.size());
-  VertexGrid staying(positions, vertices, distance);
+  VertexGrid staying = grid_for(positions, vertices, distance);
   if (!staying.is_usable()) return number;
   std::size_t cost = 0;
   for (const Index v : vertices) {
@@ -242,7 +183,7 @@ std::vector<Index> near_vertices(std::span<const Vec3> positions, std::span<cons
     });
     if (cost > kMostComparisons) break;
     if (nearest.second == kNoIndex)
-      staying.add(v);
+      staying.add(v, positions[v]);
     else
       number[v] = nearest.second;
   }
