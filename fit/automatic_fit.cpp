@@ -41,9 +41,8 @@ namespace {
 constexpr double kMostGrowth = 1.5;  // of the number of cells by cutting some of them
 /// Largest share of the cells allowed that a template may have if some of its cells are to be cut.
 constexpr double kMostShareOfGrid = 0.75;
-/// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest. The fits with edges that
-/// had a second round (i07 twice, fan-shroud) gained nothing by it.
-constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
+/// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest.
+constexpr int kMostRefinements = 2;
 /// Largest number of routings of one grid. Each gives up edges at which the one before left poor cells.
 constexpr int kMostRoutings = 5;
 /// Numbers of cells, as shares of that of the first grid, of other grids on which edges are laid out. Whether a long
@@ -56,8 +55,6 @@ constexpr std::array kOtherFreeGrids{1.0, 0.87};
 constexpr std::size_t kMostLongLost = 2;
 /// Share of the area on planes from which on grids that are not through them are worse.
 constexpr double kMany = 0.4;
-/// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
-constexpr double kWorthRefining = 0.5;
 
 /// An automatic fit of one solid: the search among templates.
 class AutomaticFit : AutomaticSolidDriver {
@@ -95,10 +92,11 @@ class AutomaticFit : AutomaticSolidDriver {
   void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
   /// Nor are larger meshes, if the number of cells is free: it takes minutes and gains little.
+  /// Nor are meshes that follow edges: of 25 parts and models, whose fits took twice as long with a refinement, it
+  /// improved four by little and none from a failure to a success. Cells between small and large ones are too poor.
   bool is_worth_refining() const {
     const bool has_room = options_.cells || static_cast<double>(best().cells) <= most_refined_cells();
-    return !options_.makes_cage && !is_good() && has_room &&
-           (best_start_.kind == AutomaticAttempt::Kind::smooth || best().merit > kWorthRefining);
+    return !options_.makes_cage && !is_good() && has_room && best_start_.kind == AutomaticAttempt::Kind::smooth;
   }
 
   std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
@@ -175,7 +173,7 @@ std::optional<AutoTemplate> AutomaticFit::make_grid(AutomaticAttempt::Kind kind,
 std::optional<AutomaticFitTrial> AutomaticFit::lay_out_on(AutoTemplate grid, AutomaticAttempt::Kind kind) {
   const AutomaticFitTrial described{.template_cells = grid.mesh.num_cells(),
                                     .through_planes = kind == AutomaticAttempt::Kind::aligned};
-  if (fit_smoothly({std::move(grid.mesh), {}}, kind)) return described;
+  if (fit_smoothly(std::move(grid.mesh), kind)) return described;
   if (result_.trials.empty()) judge(described);
   return std::nullopt;
 }
@@ -272,43 +270,33 @@ bool AutomaticFit::run_graded() {
   mesh_ = std::move(graded->mesh);
   begin_mesh();
   sizes_ = graded->sizes;
-  start_ = {.grid = {{}, std::move(graded->sizes)}};
+  start_ = {.sizes = std::move(graded->sizes)};
   AutomaticFitTrial trial{.template_cells = finest_->mesh.num_cells(), .refined_cells = mesh_.num_cells()};
   return fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality)), ", graded") && judge(trial) &&
          relax_last_trial();
 }
 
-/// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit
-/// must end.
+/// Cuts the cells at which the best trial, which follows no edges, is not as good as aimed at, and fits the result.
+/// Returns false if the fit must end.
 bool AutomaticFit::run_refined() {
   const AutomaticFitTrial before = best();
-  const bool is_smooth = best_start_.kind == AutomaticAttempt::Kind::smooth;
-  const VolumeMesh& base = is_smooth ? result_.mesh : best_start_.grid.mesh;
-  const double most_cells =
+  const double most =
       options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(before.cells);
-  const double room = most_cells * static_cast<double>(base.num_cells()) / static_cast<double>(before.cells);
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> refined =
-      refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room), &stop);
+      refined_at_faults(result_.mesh, best_start_.sizes, faults_of_best(), static_cast<std::size_t>(most), &stop);
   if (stop.is_stopped()) {
     note_end_in("the refinement of cells");
     return false;
   }
   if (!refined) return true;
-  AutomaticFitTrial trial{.template_cells = before.template_cells,
-                          .through_planes = before.through_planes,
-                          .refined_cells = refined->mesh.num_cells(),
-                          .level = before.level};
-  if (!is_smooth) {
-    if (!fit_smoothly(std::move(*refined), best_start_.kind)) return false;
-    if (options_.cells && mesh_.num_cells() > *options_.cells) return true;  // its pads took more room than before
-    return route_and_fit(trial);
-  }
+  AutomaticFitTrial trial{
+      .template_cells = before.template_cells, .refined_cells = refined->mesh.num_cells(), .level = before.level};
   layout_.reset();
   mesh_ = std::move(refined->mesh);
   begin_mesh(stages_of_best());
   sizes_ = refined->sizes;
-  start_ = {.grid = {{}, std::move(refined->sizes)}};
+  start_ = {.sizes = std::move(refined->sizes)};
   return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&
          judge(trial) && relax_last_trial();
 }
@@ -327,7 +315,7 @@ void AutomaticFit::take_best() {
   if (is_present_best() || !is_strict() || best_start_.kind != AutomaticAttempt::Kind::smooth) return;
   layout_.reset();
   mesh_ = result_.mesh;
-  sizes_ = best_start_.grid.sizes;
+  sizes_ = best_start_.sizes;
   start_ = best_start_;
   take_states();
 }
@@ -358,8 +346,7 @@ AutomaticFitResult AutomaticFit::run() {
     begin_attempt();
     going = run_graded();
   }
-  const int most_refinements = edges_.features.curves.empty() ? kMostRefinements : kMostRefinementsWithEdges;
-  for (int round = 0; going && is_worth_refining() && round < most_refinements; ++round) {
+  for (int round = 0; going && is_worth_refining() && round < kMostRefinements; ++round) {
     const std::size_t before = result_.chosen;
     begin_attempt();
     going = run_refined();

@@ -160,8 +160,8 @@ struct AutomaticFitResult {
 /// best trial is too far from the target, meets itself or has poor cells (`fit/fits/graded_template.h`).
 ///
 /// If no trial is good still, cells of the best one are cut in 27 where it meets itself, where it is too far from the
-/// target, where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the
-/// result is fitted: up to twice, and to the number of cells allowed, or half as many again if the number is free.
+/// target, and where cells are poor (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to the number
+/// of cells allowed, or half as many again if the number is free. Meshes that follow edges are not refined.
 ///
 /// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///

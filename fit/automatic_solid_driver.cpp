@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_solid_driver.h"
 
-#include "subvol/base/error.h"
 #include "subvol/base/sort_unique.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/signed_features.h"
@@ -17,7 +16,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
 #include <span>
 #include <utility>
@@ -108,7 +106,7 @@ bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule,
   const MeshTopology topology(mesh_);
   const std::vector<double> sizes = cage_ ? cage_->of_children(sizes_) : sizes_;
   std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
-  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid.mesh, mesh_, QualityWeights{}.least_edge, lengths);
+  if (!cage_ && sizes.empty()) keep_flat_cells(start_.grid, mesh_, QualityWeights{}.least_edge, lengths);
   const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of(mesh_);
   sample_target(topology.boundary_faces().size());
   QualityBoundary boundary{
@@ -119,18 +117,14 @@ bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule,
     boundary.group_of_triangle = layout_->group_of_triangle;
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
-        CreaseEnergy energy = level_layout_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
-                                                           kQualityTangentialWeight);
-        const VolumeMesh& of_unknowns = cage_ ? cage_->cage : mesh_;
-        if (!sizes_.empty())
-          energy.weigh(crease_factors(of_unknowns, MeshTopology(of_unknowns), sizes_, samples.positions));
-        return energy;
+        return level_layout_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
+                                            kQualityTangentialWeight);
       };
   }
   const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
     const std::span<const EdgeCap> edges =
         layout_ ? std::span<const EdgeCap>(level_layout_.caps.edges) : std::span<const EdgeCap>();
-    const double least_edge = cage_ ? 0 : least_edge_share(start_.grid.mesh, lengths);
+    const double least_edge = cage_ ? 0 : least_edge_share(start_.grid, lengths);
     stages.energy().forbid_folds(edges, least_edge);
     QualityCaps caps = layout_ ? level_layout_.caps : QualityCaps();
     add_caps_between_sizes(mesh_, sizes, caps);
@@ -201,11 +195,7 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
-  if (!keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed)) return going;
-  start_.lost.clear();
-  for (const UnfollowedCurve& curve : unfollowed)
-    if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.points);
-  best_start_ = start_;
+  if (keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed)) best_start_ = start_;
   return going;
 }
 
@@ -219,12 +209,12 @@ std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
   return cage_ ? cage_->sums_of_parts(faults) : faults;
 }
 
-bool AutomaticSolidDriver::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind) {
+bool AutomaticSolidDriver::fit_smoothly(VolumeMesh grid, AutomaticAttempt::Kind kind) {
   layout_.reset();
   cage_.reset();
-  mesh_ = grid.mesh;
+  mesh_ = grid;
   begin_mesh();
-  sizes_ = grid.sizes;
+  sizes_.clear();
   start_ = {.kind = kind, .grid = std::move(grid)};
   if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) return false;
   start_.fitted = mesh_.positions;
@@ -235,13 +225,11 @@ bool AutomaticSolidDriver::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind k
 
 void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
   routing.cancelled = [this] { return runner_.is_to_end(); };
-  routing.sizes = vertex_sizes(start_.grid.mesh, start_.grid.sizes);
-  layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
+  layout_ = edge_layout(start_.grid, start_.fitted, edges_.mesh, edges_.features, routing);
   cage_.reset();
   mesh_ = layout_->tagged_mesh;
   begin_mesh(start_.stages);
   level_layout_ = {layout_->group_of_face, layout_->caps, layout_->creases};
-  sizes_ = padded_sizes(mesh_, start_.grid.sizes);
 }
 
 std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
@@ -257,17 +245,6 @@ std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   for (const Index c : poor)
     if (least[c] < kEnoughQuality * options_.quality) faults.push_back({c});
   for (const Index c : best_start_.far) faults.push_back({c});
-  if (best_start_.kind == AutomaticAttempt::Kind::smooth) return faults;
-  const VolumeMesh& grid = best_start_.grid.mesh;
-  const CellCenters centers(grid, best_start_.fitted);
-  for (Fault& fault : faults) fault = centers.nearest(result_.mesh, fault);
-  const BoundaryCells cells(grid, best_start_.fitted);
-  std::vector<std::vector<Vec3>> lost = best_start_.lost;
-  std::ranges::stable_sort(lost, std::greater{}, [](const std::vector<Vec3>& curve) { return polyline_length(curve); });
-  const double spacing = std::sqrt(target_.surface.area() / static_cast<double>(grid.num_cells()));
-  for (const std::vector<Vec3>& curve : lost) faults.push_back(cells.near(sampled_polyline(curve, spacing)));
-  const TriangleMesh surface = refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh)));
-  faults.push_back(cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
   return faults;
 }
 

@@ -43,7 +43,7 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// Returns the boundary of the target's solid, which is found once.
   const SolidBoundary& solid();
   /// Brings a grid near the target and lays out the edges on it. Returns false if the fit must end.
-  bool fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind);
+  bool fit_smoothly(VolumeMesh grid, AutomaticAttempt::Kind kind);
   /// Routes the edges on the grid that was brought near the target.
   void lay_out(RoutingOptions routing);
   /// Makes the present mesh, with the tags that its subdivision surface needs, a cage.
@@ -56,9 +56,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   /// Returns how poor each cell of the present mesh, or of its cage, is, 0 for good ones.
   /// may_meet: false if the boundary is known not to meet itself.
   std::vector<double> faults_of_cells(bool may_meet) const;
-  /// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh
-  /// if not. First those whose faces meet others, then the poor ones, the worst first, then those too far from the
-  /// target, then those at edges without a path, the longest first, then those at small features.
+  /// Returns the cells at which the best trial, which follows no edges, is not as good as aimed at: first those whose
+  /// faces meet others, then the poor ones, the worst first, then those too far from the target.
   std::vector<Fault> faults_of_best() const;
 
   const TriangleMesh& original_;

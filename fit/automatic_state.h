@@ -22,11 +22,11 @@ struct Edges {
 /// Tells what a trial was made from, and where it is not as good as aimed at.
 struct TrialStart {
   AutomaticAttempt::Kind kind = AutomaticAttempt::Kind::smooth;
-  SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
-  std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
-  std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
-  std::vector<std::size_t> stages;      ///< that brought the grid near the target, by their numbers in the report
-  std::vector<std::vector<Vec3>> lost;  ///< curves without a path, and ends of curves that paths leave out
+  VolumeMesh grid;                  ///< if edges are followed; else without cells
+  std::vector<Vec3> fitted;         ///< positions of the grid's vertices near the target
+  std::vector<double> sizes;        ///< of the cells of the trial's mesh (`SizedMesh`)
+  std::vector<Index> far, poor;     ///< cells of the trial's mesh that are too far from the target, or below the goal
+  std::vector<std::size_t> stages;  ///< that brought the grid near the target, by their numbers in the report
 };
 
 /// This is what a level needs of an edge layout. The layout belongs to a mesh; if that mesh is a cage, the faces and

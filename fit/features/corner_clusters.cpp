@@ -66,7 +66,7 @@ std::map<Index, Index> corner_clusters(const RoutingGraph& graph, const SignedFe
   for (const auto& [length, c] : order) {
     const std::size_t a = cluster_of[curves[c].vertices.front()], b = cluster_of[curves[c].vertices.back()];
     Cluster &to = clusters[std::min(a, b)], &from = clusters[std::max(a, b)];
-    if (a == b || extent(to, from) > kLeastRoutedLength * edge_lengths_near(graph, curves[c]).mean) continue;
+    if (a == b || extent(to, from) > kLeastRoutedLength * graph.edge_length()) continue;
     const std::vector<Index> moved = from.corners;
     if (!join(to, from)) continue;
     for (const Index corner : moved) cluster_of[corner] = std::min(a, b);

@@ -65,7 +65,7 @@ void CornerPlacement::place() {
 }
 
 double CornerPlacement::distance(const Needs& needs, Index v) const {
-  return (graph_.position(v) - needs.position).norm() / (h_ * graph_.size(v));
+  return (graph_.position(v) - needs.position).norm() / h_;
 }
 
 double CornerPlacement::cost(const Needs& needs, Index v) const {

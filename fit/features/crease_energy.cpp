@@ -69,7 +69,6 @@ CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std:
   result.width_ = width_;
   result.tau_ = tau_;
   result.offsets_.assign(is_free.size() + 1, 0);
-  if (!factors_.empty()) result.factors_.assign(is_free.size(), 1);
   const auto moves_there = [&](Index sample) { return numbers[sample] != kNoIndex && is_free[numbers[sample]] != 0; };
   for (const Curve& curve : curves_) {
     if (!is_moving(curve, moves_there)) continue;
@@ -79,21 +78,12 @@ CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std:
       const auto [a, b] = segments_[s].ends;
       own.segments.push_back(static_cast<Index>(result.segments_.size()));
       result.segments_.push_back({{numbers[a], numbers[b]}, number});
-      if (factors_.empty()) continue;
-      for (const Index end : segments_[s].ends) result.factors_[numbers[end]] = factors_[end];
     }
     for (const Index end : curve.ends) own.ends.push_back(numbers[end]);
     result.curves_.push_back(std::move(own));
   }
   result.is_free_ = std::move(is_free);
   return result;
-}
-
-void CreaseEnergy::weigh(std::vector<double> factors) {
-  if (factors.size() + 1 != offsets_.size() || !std::ranges::all_of(factors, [](double f) { return f > 0; }))
-    throw InputError("CreaseEnergy: one positive factor is needed for each of the " +
-                     std::to_string(offsets_.size() - 1) + " samples");
-  factors_ = std::move(factors);
 }
 
 /// Displacements along the curve count with tau only, those at the ends of an open curve fully.

@@ -22,7 +22,7 @@ namespace subvol::internal {
 ///
 /// y_k, b_k   points of T's curves and the length that each represents;  s(y): closest point of S's curve
 /// x_q, c_q   points of S's curves with their lengths;  t(x): closest point of T's curve
-/// width      a crease counts as much as a strip of the surface of this width; times the factor there (`weigh`), if any
+/// width      a crease counts as much as a strip of the surface of this width
 ///
 /// The ends of an open curve also correspond to each other, with M = I and the length of S's last segment, so that
 /// creases end where T's do.
@@ -57,10 +57,6 @@ class CreaseEnergy {
   /// is_free  of each new sample: 1 if it moves.
   CreaseEnergy part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const;
 
-  /// From the next `assign` on, a link counts as many times as the mean of these factors at the ends of its segment.
-  /// One positive factor per sample, else InputError.
-  void weigh(std::vector<double> factors);
-
   /// Finds the correspondences for these samples and freezes them.
   void assign(std::span<const Vec3> samples);
 
@@ -93,17 +89,14 @@ class CreaseEnergy {
   void link_target(const Curve& curve, std::span<const Vec3> samples);
   void link_creases(const Curve& curve, std::span<const Vec3> samples);
   void link_ends(const Curve& curve, std::span<const Vec3> samples);
-  void add_link(Link link) {
-    if (!moves(link.ends)) return;
-    if (!factors_.empty()) link.weight *= 0.5 * (factors_[link.ends[0]] + factors_[link.ends[1]]);
-    links_.push_back(link);
+  void add_link(const Link& link) {
+    if (moves(link.ends)) links_.push_back(link);
   }
   Mat3 metric(const Curve& curve, Index segment, const Vec3& closest) const;
 
   std::vector<Curve> curves_;
   std::vector<CreaseSegment> segments_;
   double width_ = 0, tau_ = 0;
-  std::vector<double> factors_;        ///< per sample; empty: all 1
   std::vector<std::uint8_t> is_free_;  ///< of each sample; empty: all are
   std::vector<Link> links_;
   std::vector<std::size_t> offsets_;  ///< where each sample begins in link_numbers_

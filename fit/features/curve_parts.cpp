@@ -40,7 +40,7 @@ class PartSearch {
  public:
   PartSearch(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurve& curve, Index c,
              const Occupied& occupied)
-      : search_(search), graph_(graph), curve_(curve), c_(c), h_(search.edge_length(c)), occupied_(occupied) {}
+      : search_(search), graph_(graph), curve_(curve), c_(c), h_(graph.edge_length()), occupied_(occupied) {}
 
   std::vector<PartPath> run() {
     const double length = curve_.length();
@@ -118,7 +118,7 @@ class PartSearch {
 
 std::vector<PartPath> find_parts(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurves& curves,
                                  Index c, const Occupied& occupied) {
-  const double h = search.edge_length(c);
+  const double h = graph.edge_length();
   if (!(h > 0) || curves.curves[c].length() < kLeastPart * h) return {};
   return PartSearch(search, graph, curves.curves[c], c, occupied).run();
 }

@@ -50,13 +50,9 @@ CurveSearch::CurveSearch(const RoutingGraph& graph, const SignedFeatures& featur
       corners_(corners),
       along_sheet_curves_(along_sheet_curves),
       cancelled_(std::move(cancelled)),
+      h_(graph.edge_length()),
       courses_(curves_.size()) {
-  for (const FeatureCurve& curve : curves_) {
-    const RoutingGraph::Sizes lengths = edge_lengths_near(graph, curve);
-    h_.push_back(lengths.mean);
-    largest_h_.push_back(lengths.largest);
-    trees_.push_back(polyline_tree(curve.points));
-  }
+  for (const FeatureCurve& curve : curves_) trees_.push_back(polyline_tree(curve.points));
 }
 
 /// Returns a path with its gap if it follows a curve, or a part of it: the points `curve`.
@@ -66,19 +62,10 @@ std::optional<CurveSearch::Found> CurveSearch::judged(std::vector<Index> path, I
   std::vector<Vec3> points;
   for (Index v : path) points.push_back(graph_.position(v));
   if (polyline_length(points) > kMostStretch * polyline_length(curve)) return std::nullopt;
-  const double spacing = h_[c] / 4, h = graph_.edge_length();
-  std::vector<double> lengths;  // h at each edge of the path
-  double gap = 0;
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-    lengths.push_back(h * std::max(graph_.size(path[i]), graph_.size(path[i + 1])));
-    const auto samples = sampled_polyline(std::span(points).subspan(i, 2), spacing);
-    gap = std::max(gap, farthest(samples, trees_[c]) / lengths.back());
-  }
-  const ClosestPoint of_path = polyline_tree(points);
-  for (const Vec3& p : sampled_polyline(curve, spacing)) {
-    const ClosestPoint::Hit hit = of_path.closest(p);
-    gap = std::max(gap, hit.distance / lengths[hit.triangle]);
-  }
+  const double spacing = h_ / 4;
+  const double distance = std::max(farthest(sampled_polyline(points, spacing), trees_[c]),
+                                   farthest(sampled_polyline(curve, spacing), polyline_tree(points)));
+  const double gap = distance / h_;
   if (!(gap <= most)) return std::nullopt;
   return Found{std::move(path), gap};
 }
@@ -86,7 +73,7 @@ std::optional<CurveSearch::Found> CurveSearch::judged(std::vector<Index> path, I
 CurveWalk CurveSearch::walk_along(Index c, std::vector<Vec3> points, double most) const {
   return {std::move(points),
           along_sheet_curves_ ? sheet_factors((*along_sheet_curves_)[c] != 0) : edge_factors(features_.angles[c]),
-          kSoftness * h_[c], most * largest_h_[c]};
+          kSoftness * h_, most * h_};
 }
 
 CurveSearch::Course CurveSearch::straight_course(Index c) const {
@@ -130,7 +117,7 @@ CurveSearch::Course CurveSearch::round_course(Index c) const {
 
 /// Returns the place along a curve that is about as near to a vertex as any.
 double CurveSearch::place_nearest_to_vertex(Index c) const {
-  const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, h_[c] / 8);
+  const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, h_ / 8);
   double distance = kInfinity, place = 0, along = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (i > 0) along += (samples[i] - samples[i - 1]).norm();
@@ -155,17 +142,17 @@ std::vector<CurveSearch::Course>& CurveSearch::courses(Index c) {
 
 /// Returns a vertex for each anchor: none of them twice, none occupied but fixed ones. Empty if there is none.
 /// allowed  vertices to choose from, ascending; empty: all.
-std::vector<Index> CurveSearch::anchor_vertices(const Course& course, double h, const Occupied& occupied,
+std::vector<Index> CurveSearch::anchor_vertices(const Course& course, const Occupied& occupied,
                                                 std::span<const Index> allowed) const {
   std::vector<Index> chosen;
   for (const Anchor& anchor : course.anchors) chosen.push_back(anchor.fixed);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     double least = kInfinity;
     if (course.anchors[i].fixed != kNoIndex) continue;
-    for (Index v : graph_.vertices_near(course.anchors[i].point, kAnchorReach * h)) {
+    for (Index v : graph_.vertices_near(course.anchors[i].point, kAnchorReach * h_)) {
       if (occupied.vertices[v] || std::ranges::find(chosen, v) != chosen.end()) continue;
       if (!allowed.empty() && !std::ranges::binary_search(allowed, v)) continue;
-      double cost = (graph_.position(v) - course.anchors[i].point).squaredNorm() * h;
+      double cost = (graph_.position(v) - course.anchors[i].point).squaredNorm() * h_;
       if (!occupied.vertex_prices.empty()) cost += occupied.vertex_prices[v];
       if (cost < least) least = cost, chosen[i] = v;
     }
@@ -177,7 +164,7 @@ std::vector<Index> CurveSearch::anchor_vertices(const Course& course, double h, 
 std::vector<Index> CurveSearch::path_on(Course& course, Index c, const Occupied& occupied,
                                         std::span<const Index> allowed) const {
   const bool closed = curves_[c].closed();
-  const std::vector<Index> anchors = anchor_vertices(course, h_[c], occupied, allowed);
+  const std::vector<Index> anchors = anchor_vertices(course, occupied, allowed);
   if (anchors.empty()) return {};
   std::vector<Index> path = {anchors[0]}, own = anchors;
   std::ranges::sort(own);
@@ -204,7 +191,7 @@ bool CurveSearch::lacks_corner(Index c) const {
 std::optional<CurveSearch::Found> CurveSearch::find_on_one_side(Index c, const Occupied& occupied) {
   std::optional<Found> best;
   for (const std::vector<Index>& side :
-       path_sides(graph_, sampled_polyline(curves_[c].points, h_[c] / 2), kAnchorReach * h_[c], occupied))
+       path_sides(graph_, sampled_polyline(curves_[c].points, h_ / 2), kAnchorReach * h_, occupied))
     for (Course& course : courses(c))
       if (auto found = judged(path_on(course, c, occupied, side), c, curves_[c].points, kFollowDistance))
         if (!best || found->gap < best->gap) best = std::move(found);

@@ -33,8 +33,6 @@ class CurveSearch {
   CurveSearch(const CurveSearch&) = delete;
   CurveSearch& operator=(const CurveSearch&) = delete;
 
-  /// Returns h near a curve.
-  double edge_length(Index c) const { return h_[c]; }
   /// Returns true if an open curve ends at a corner without a vertex.
   bool lacks_corner(Index c) const;
 
@@ -80,7 +78,7 @@ class CurveSearch {
   double place_nearest_to_vertex(Index c) const;
   /// most: distance beyond which no path goes, in units of h.
   CurveWalk walk_along(Index c, std::vector<Vec3> points, double most = kFollowDistance) const;
-  std::vector<Index> anchor_vertices(const Course& course, double h, const Occupied& occupied,
+  std::vector<Index> anchor_vertices(const Course& course, const Occupied& occupied,
                                      std::span<const Index> allowed) const;
   std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied,
                              std::span<const Index> allowed = {}) const;
@@ -94,7 +92,7 @@ class CurveSearch {
   const CornerPlacement& corners_;
   std::optional<std::span<const std::uint8_t>> along_sheet_curves_;
   std::function<bool()> cancelled_;
-  std::vector<double> h_, largest_h_;         ///< near each curve
+  double h_;                                  ///< mean length of the edges
   std::vector<ClosestPoint> trees_;           ///< of the curves
   std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
 };

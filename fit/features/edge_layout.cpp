@@ -14,27 +14,16 @@ namespace subvol::internal {
 
 namespace {
 
-/// h near each curve that no path follows as a whole; 0 for the others.
-std::vector<double> lengths_near_lost(const VolumeMesh& near_target, const SignedFeatures& features,
-                                      const FeatureRouting& routing, const RoutingOptions& options) {
-  std::vector<double> lengths(features.curves.curves.size(), 0.0);
-  if (routing.unfollowed.empty()) return lengths;
-  const RoutingGraph graph(near_target, false, options.sizes);
-  for (const UnfollowedCurve& lost : routing.unfollowed)
-    lengths[lost.curve] = edge_lengths_near(graph, features.curves.curves[lost.curve]).mean;
-  return lengths;
-}
-
-/// near_target  the grid at its fitted positions.
+/// near_target  the grid at its fitted positions.  h: mean length of the edges of its boundary.
 EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, const TriangleMesh& target,
-                     const SignedFeatures& features, FeatureRouting routing, std::span<const double> lengths) {
+                     const SignedFeatures& features, FeatureRouting routing, double h) {
   EdgeLayout layout;
   layout.routing = std::move(routing);
   layout.patched = patched_mesh(grid, near_target.positions, layout.routing, target);
   PatchGroups groups =
       patch_groups(MeshTopology(grid), layout.patched.patches, near_target.positions, target, features);
   layout.pads = add_pads(layout.patched, features);
-  NarrowStrips strips = follow_narrow_strips(layout.patched, layout.routing, groups, target, features, lengths);
+  NarrowStrips strips = follow_narrow_strips(layout.patched, layout.routing, groups, target, features, h);
   std::ranges::move(strips.pads, std::back_inserter(layout.pads.pads));
   layout.caps = quality_caps(layout.patched, features);
   layout.tagged_mesh = layout.patched.mesh;
@@ -59,11 +48,11 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   VolumeMesh near_target = grid;
   near_target.positions.assign(fitted.begin(), fitted.end());
   const FeatureRouting routing = route_features(near_target, features, options);
-  const std::vector<double> lengths = lengths_near_lost(near_target, features, routing, options);
-  std::vector<Index> beside = strips_in_parts(routing, target, features, lengths);
+  const double h = RoutingGraph(near_target).edge_length();
+  std::vector<Index> beside = strips_in_parts(routing, target, features, h);
   while (true) {
     EdgeLayout layout =
-        layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), lengths);
+        layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), h);
     // Curves that no strip follows are followed in parts again.
     const auto is_lost = [&](Index c) {
       return std::ranges::find(layout.routing.unfollowed, c, &UnfollowedCurve::curve) !=

@@ -43,7 +43,7 @@ class Router {
   Router(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options)
       : features_(features),
         curves_(features.curves.curves),
-        graph_(mesh, options.on_sheets, options.sizes),
+        graph_(mesh, options.on_sheets),
         h_(graph_.edge_length()),
         reasons_(curves_.size()),
         joinable_(curves_.size(), 1),
@@ -166,8 +166,7 @@ class Router {
         reasons_[c] = NotFollowed::excluded;
       else if (features_.angles[c] < kLeastAngle)
         reasons_[c] = NotFollowed::too_acute;
-      else if (curves_[c].length() < kLeastRoutedLength * edge_lengths_near(graph_, curves_[c]).mean &&
-               !has_edge_on(graph_, curves_[c]))
+      else if (curves_[c].length() < kLeastRoutedLength * h_ && !has_edge_on(graph_, curves_[c]))
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }
@@ -368,15 +367,14 @@ class Router {
     const FeatureCurve& curve = curves_[c];
     const ArcLength arc(curve.points);
     const Vec3 middle = arc.at(arc.length() / 2);
-    const double h = search_->edge_length(c);
     const auto because = [&](NotFollowed reason, const Vec3& place) {
       return UnfollowedCurve{c, reason, place, curve.points, arc.length()};
     };
     if (!is_eligible(c)) return because(*reasons_[c], middle);
-    for (int end = 0; end < 2 && search_->lacks_corner(c) && curve.length() >= h; ++end)
+    for (int end = 0; end < 2 && search_->lacks_corner(c) && curve.length() >= h_; ++end)
       if (vertex_of(corner_at(c, end)) == kNoIndex)
         return because(NotFollowed::no_vertex_at_corner, end == 0 ? curve.points.front() : curve.points.back());
-    if (curve.length() < h) return because(NotFollowed::shorter_than_cell, middle);
+    if (curve.length() < h_) return because(NotFollowed::shorter_than_cell, middle);
     if (!std::ranges::binary_search(alone_, c)) return because(NotFollowed::no_path_nearby, middle);
     for (int end = 0; end < 2; ++end)
       if (has_too_few_edges(corner_at(c, end)))

@@ -40,8 +40,6 @@ struct RoutingOptions {
   /// One entry per curve, not zero for those whose paths run along feature curves of the sheets, which no other path
   /// uses; empty: none. Only with `on_sheets`.
   std::vector<std::uint8_t> along_sheet_curves;
-  /// One entry per vertex: the length of its edges beside that of others, > 0, where a mesh is refined. Empty: all 1.
-  std::vector<double> sizes;
   /// Asked before each search; if it returns true, no more paths are found. Empty: never.
   std::function<bool()> cancelled;
 };
@@ -64,9 +62,8 @@ struct FeatureRouting {
 ///                    + 3 if the vertex has fewer edges than the corner has curves
 ///                    + 4 if distance > 1.1 h,                                              distance < 1.6 h
 ///
-/// h is the mean length of the boundary's edges, of edges of size 1 if sizes are given; it is multiplied by the size at
-/// a vertex or an edge, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle
-/// below 19 degrees, are left alone, and so are corners without other curves. The path between two of them minimizes
+/// h is the mean length of the boundary's edges. Curves shorter than h / 2, or with an angle below 19 degrees, are left
+/// alone, and so are corners without other curves. The path between two of them minimizes
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;

@@ -152,11 +152,8 @@ class Rows {
 /// Finds the strips of a target.
 class StripFinder {
  public:
-  StripFinder(const TriangleMesh& target, const SignedFeatures& features, std::span<const double> lengths)
-      : features_(features),
-        curves_(features.curves.curves),
-        lengths_(lengths),
-        areas_(areas_of_regions(target, features)) {}
+  StripFinder(const TriangleMesh& target, const SignedFeatures& features, double h)
+      : features_(features), curves_(features.curves.curves), h_(h), areas_(areas_of_regions(target, features)) {}
 
   /// Returns the narrow strips between curves that are lost and others that are followed, the narrowest first.
   std::vector<Strip> strips(const FeatureRouting& routing) const {
@@ -183,8 +180,7 @@ class StripFinder {
   bool may_be_followed(const UnfollowedCurve& lost) const {
     const FeatureCurve& curve = curves_[lost.curve];
     return lost.reason != NotFollowed::excluded && lost.reason != NotFollowed::too_acute &&
-           !(curve.closed() && features_.curves.is_corner(curve.vertices.front())) &&
-           curve.length() >= lengths_[lost.curve];
+           !(curve.closed() && features_.curves.is_corner(curve.vertices.front())) && curve.length() >= h_;
   }
 
   std::optional<Strip> strip_between(Index lost, Index followed) const {
@@ -194,11 +190,10 @@ class StripFinder {
       if (r != kNoIndex && features_.sides[followed].has(r) && (region == kNoIndex || areas_[r] < areas_[region]))
         region = r;
     if (region == kNoIndex || c.closed() != n.closed()) return std::nullopt;
-    const double h = lengths_[lost];
-    const Beside of_lost = beside(c, n, kSpacing * h);
-    if (of_lost.most > kMostWidth * h) return std::nullopt;
-    const Beside of_followed = beside(n, c, kSpacing * h);
-    if (of_followed.most > kMostWidth * h) return std::nullopt;
+    const Beside of_lost = beside(c, n, kSpacing * h_);
+    if (of_lost.most > kMostWidth * h_) return std::nullopt;
+    const Beside of_followed = beside(n, c, kSpacing * h_);
+    if (of_followed.most > kMostWidth * h_) return std::nullopt;
     return Strip{lost,
                  followed,
                  region,
@@ -209,7 +204,7 @@ class StripFinder {
 
   const SignedFeatures& features_;
   const std::vector<FeatureCurve>& curves_;
-  std::span<const double> lengths_;
+  double h_;
   std::vector<double> areas_;
 };
 
@@ -425,20 +420,19 @@ class StripFollower {
 }  // namespace
 
 std::vector<Index> strips_in_parts(const FeatureRouting& routing, const TriangleMesh& target,
-                                   const SignedFeatures& features, std::span<const double> lengths) {
+                                   const SignedFeatures& features, double h) {
   std::vector<Index> curves;
   if (routing.parts.empty()) return curves;
-  for (const Strip& strip : StripFinder(target, features, lengths).strips(routing))
+  for (const Strip& strip : StripFinder(target, features, h).strips(routing))
     if (is_in_parts(routing, strip.lost)) curves.push_back(strip.lost);
   sort_unique(curves);
   return curves;
 }
 
 NarrowStrips follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
-                                  const TriangleMesh& target, const SignedFeatures& features,
-                                  std::span<const double> lengths) {
+                                  const TriangleMesh& target, const SignedFeatures& features, double h) {
   if (routing.unfollowed.empty() || routing.paths.empty()) return {};
-  const StripFinder finder(target, features, lengths);
+  const StripFinder finder(target, features, h);
   return StripFollower(patched, routing, groups, features, finder).run();
 }
 

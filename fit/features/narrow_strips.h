@@ -8,7 +8,6 @@
 #include "subvol/surface/triangle_mesh.h"
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 namespace subvol::internal {
@@ -32,7 +31,7 @@ struct NarrowStrips {
 /// is there already serves as well.
 ///
 /// A curve C is followed like this if
-///   - no path follows any part of it, and it is at least h long (`edge_lengths_near`);
+///   - no path follows any part of it, and it is at least h long;
 ///   - each of the two curves is at most 0.95 h away from the other all along, and both are open or both are closed;
 ///   - the region between them has at most 1.5 times the area of a strip of their mean length and distance;
 ///   - it has no corner if it is closed, and no corner in common with N if it is open: such a strip tapers to a point;
@@ -45,16 +44,15 @@ struct NarrowStrips {
 /// patched   from `patched_mesh` and `add_pads`. Its positions may gain vertices, as by `pad`.
 /// routing   in: that of `patched`. out: curves that are followed now are no longer among `unfollowed`.
 /// groups    in: those of `patched`. out: with the new patches.
-/// lengths   h near each curve, for curves in `unfollowed`; one entry per curve.
+/// h         mean length of the edges of the boundary.
 /// features  from `signed_features`.  target  that of `features`.
 /// Deterministic, serial. InputError: as `add_pads`. Cost: a few passes over the mesh per curve.
 NarrowStrips follow_narrow_strips(PatchedMesh& patched, FeatureRouting& routing, PatchGroups& groups,
-                                  const TriangleMesh& target, const SignedFeatures& features,
-                                  std::span<const double> lengths);
+                                  const TriangleMesh& target, const SignedFeatures& features, double h);
 
 /// Returns the curves that paths follow in parts, and that run beside a followed curve so that `follow_narrow_strips`
 /// may follow them as a whole if the parts are left out; ascending.
 std::vector<Index> strips_in_parts(const FeatureRouting& routing, const TriangleMesh& target,
-                                   const SignedFeatures& features, std::span<const double> lengths);
+                                   const SignedFeatures& features, double h);
 
 }  // namespace subvol::internal

@@ -26,14 +26,15 @@ struct Use {
 class Negotiation {
  public:
   Negotiation(const RoutingGraph& graph, const FeatureCurves& features, const Occupied& base)
-      : graph_(graph), features_(features), priced_(base), paths_(features.curves.size()) {
+      : graph_(graph),
+        features_(features),
+        priced_(base),
+        unit_(std::pow(graph.edge_length(), 3)),
+        paths_(features.curves.size()) {
     vertices_.resize(base.vertices.size());
     edges_.resize(base.edges.size());
     priced_.vertex_prices.resize(vertices_.size());
     priced_.edge_prices.resize(edges_.size());
-    const double h = graph.edge_length();
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      units_.push_back(std::pow(h * graph.size(static_cast<Index>(v)), 3));
   }
 
   std::vector<std::vector<Index>> run(std::span<const Index> curves, CurveSearch& search) {
@@ -62,10 +63,8 @@ class Negotiation {
     for (std::size_t v = 0; v < vertices_.size(); ++v) set_price(static_cast<Index>(v));
     for (std::size_t e = 0; e < edges_.size(); ++e) set_edge_price(static_cast<Index>(e));
   }
-  void set_price(Index v) { priced_.vertex_prices[v] = units_[v] * vertices_[v].price(present_); }
-  void set_edge_price(Index e) {
-    priced_.edge_prices[e] = units_[graph_.edges()[e].ends[0]] * edges_[e].price(present_);
-  }
+  void set_price(Index v) { priced_.vertex_prices[v] = unit_ * vertices_[v].price(present_); }
+  void set_edge_price(Index e) { priced_.edge_prices[e] = unit_ * edges_[e].price(present_); }
 
   /// Calls visit_vertex(v) for the vertices of a path that no other may use, once each, and visit_edge(e).
   template <class VisitVertex, class VisitEdge>
@@ -122,7 +121,7 @@ class Negotiation {
   const RoutingGraph& graph_;
   const FeatureCurves& features_;
   Occupied priced_;
-  std::vector<double> units_;  ///< cube of h at each vertex
+  double unit_;  ///< of prices: the cube of h
   std::vector<Use> vertices_, edges_;
   double present_ = 0;  ///< price of another path, this round
   std::vector<std::vector<Index>> paths_, best_;

@@ -3,26 +3,18 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/features/feature_curves.h"
-#include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
 #include <cassert>
-#include <limits>
 #include <string>
-#include <utility>
 
 namespace subvol::internal {
 
-RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<double> sizes)
-    : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0), sizes_(std::move(sizes)) {
-  if (!sizes_.empty() && sizes_.size() != mesh.num_vertices())
-    throw InputError("route_features: sizes need one entry for each of the " + std::to_string(mesh.num_vertices()) +
-                     " vertices");
-  if (!std::ranges::all_of(sizes_, [](double s) { return s > 0 && s < kInfinity; }))
-    throw InputError("route_features: sizes must be positive and finite");
+RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets)
+    : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0) {
   const MeshTopology topology(mesh);
   InterfaceMarks marks;
   if (on_sheets) marks = mark_interfaces(topology, find_interfaces(mesh, topology));
@@ -46,9 +38,7 @@ RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<d
       throw InputError("route_features: the position of vertex " + std::to_string(v) + " is not finite");
     sites.push_back(position(v));
   }
-  for (const Edge& edge : edges_)
-    edge_length_ +=
-        (position(edge.ends[1]) - position(edge.ends[0])).norm() * 2 / (size(edge.ends[0]) + size(edge.ends[1]));
+  for (const Edge& edge : edges_) edge_length_ += (position(edge.ends[1]) - position(edge.ends[0])).norm();
   if (!edges_.empty()) edge_length_ /= static_cast<double>(edges_.size());
   if (!sites.empty()) tree_ = SiteTree(sites);
 }
@@ -58,17 +48,6 @@ Index RoutingGraph::edge_between(Index v, Index w) const {
     if (other_end(e, v) == w) return e;
   assert(false);
   return kNoIndex;
-}
-
-RoutingGraph::Sizes RoutingGraph::sizes_at(std::span<const Vec3> points) const {
-  if (sizes_.empty()) return {1, 1};
-  double sum = 0, largest = 0;
-  for (const Vec3& p : points) {
-    const double here = size(nearest_vertex(p));
-    sum += here;
-    largest = std::max(largest, here);
-  }
-  return {sum / static_cast<double>(points.size()), largest};
 }
 
 std::vector<Index> RoutingGraph::vertices_near(const Vec3& point, double distance) const {
@@ -87,13 +66,6 @@ void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
     vertices[path[i]] = 1;
     if (i > 0) edges[graph.edge_between(path[i - 1], path[i])] = 1;
   }
-}
-
-RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve) {
-  const double h = graph.edge_length();
-  if (!(h > 0) || !graph.has_sizes()) return {h, h};
-  const RoutingGraph::Sizes sizes = graph.sizes_at(sampled_polyline(curve.points, h / 2));
-  return {h * sizes.mean, h * sizes.largest};
 }
 
 bool has_edge_on(const RoutingGraph& graph, const FeatureCurve& curve) {

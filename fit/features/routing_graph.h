@@ -22,8 +22,7 @@ class RoutingGraph {
 
   /// mesh  must outlive the graph; finite positions of its boundary vertices, else InputError.
   /// on_sheets  also the edges of interfaces between regions.
-  /// sizes  as `RoutingOptions::sizes`.
-  explicit RoutingGraph(const VolumeMesh& mesh, bool on_sheets = false, std::vector<double> sizes = {});
+  explicit RoutingGraph(const VolumeMesh& mesh, bool on_sheets = false);
 
   std::span<const Edge> edges() const { return edges_; }
   std::span<const Index> edges_at(Index vertex) const {
@@ -37,15 +36,8 @@ class RoutingGraph {
   Index edge_between(Index v, Index w) const;
   const Vec3& position(Index vertex) const { return mesh_->positions[vertex]; }
   std::size_t num_vertices() const { return mesh_->num_vertices(); }
-  /// h: mean length of the edges, each divided by the mean size of its ends; 0 without edges.
+  /// h: mean length of the edges; 0 without edges.
   double edge_length() const { return edge_length_; }
-  bool has_sizes() const { return !sizes_.empty(); }
-  double size(Index vertex) const { return sizes_.empty() ? 1 : sizes_[vertex]; }
-  /// Returns the mean and the largest size of the vertices that are nearest to some points; at least one point.
-  struct Sizes {
-    double mean, largest;
-  };
-  Sizes sizes_at(std::span<const Vec3> points) const;
 
   /// Returns the boundary vertices within a distance of a point, ascending.
   std::vector<Index> vertices_near(const Vec3& point, double distance) const;
@@ -58,13 +50,8 @@ class RoutingGraph {
   std::vector<std::size_t> offsets_;  ///< where each vertex begins in around_
   std::vector<Index> around_, vertices_;
   double edge_length_ = 0;
-  std::vector<double> sizes_;
   SiteTree tree_;
 };
-
-/// Returns h near a curve: the mean length of the boundary's edges, of size 1, times the mean and the largest size
-/// there.
-RoutingGraph::Sizes edge_lengths_near(const RoutingGraph& graph, const FeatureCurve& curve);
 
 /// Returns true if an edge of the mesh lies on a curve of its length, as in grids with flat cells whose lines pass
 /// through the faces of a plate.

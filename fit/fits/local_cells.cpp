@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
-#include "subvol/base/sort_unique.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/templates/refine.h"
@@ -38,11 +37,6 @@ std::size_t choose(std::span<const Fault> faults, double most, std::vector<char>
   return count;
 }
 
-std::vector<Index> ascending(std::vector<Index> cells) {
-  sort_unique(cells);
-  return cells;
-}
-
 double sum_of_squared_sizes(const MeshTopology& topology, std::span<const double> sizes) {
   const auto& faces = topology.boundary_faces();
   if (sizes.empty()) return static_cast<double>(faces.size());
@@ -72,57 +66,6 @@ std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<con
     if (refined.mesh.num_cells() <= most_cells) return refined;
   }
   return std::nullopt;
-}
-
-BoundaryCells::BoundaryCells(const VolumeMesh& mesh, std::span<const Vec3> positions)
-    : cells_of_vertex_(mesh.num_vertices()) {
-  const MeshTopology topology(mesh);
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    for (const Index v : mesh.cell(c)) cells_of_vertex_[v].push_back(static_cast<Index>(c));
-  std::vector<Vec3> sites;
-  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {
-    if (!topology.is_boundary_vertex(static_cast<Index>(v))) continue;
-    vertices_.push_back(static_cast<Index>(v));
-    sites.push_back(positions[v]);
-  }
-  if (!sites.empty()) tree_ = SiteTree(sites);
-}
-
-std::vector<Index> BoundaryCells::near(std::span<const Vec3> points) const {
-  std::vector<Index> cells;
-  if (vertices_.empty()) return cells;
-  for (const Vec3& p : points) {
-    const std::vector<Index>& around = cells_of_vertex_[vertices_[tree_.site(tree_.nearest(p).place)]];
-    cells.insert(cells.end(), around.begin(), around.end());
-  }
-  return ascending(std::move(cells));
-}
-
-CellCenters::CellCenters(const VolumeMesh& mesh, std::span<const Vec3> positions) : is_empty_(mesh.num_cells() == 0) {
-  std::vector<Vec3> centers;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) centers.push_back(cell_center(mesh, positions, c));
-  if (!is_empty_) tree_ = SiteTree(centers);
-}
-
-std::vector<Index> CellCenters::nearest(const VolumeMesh& other, std::span<const Index> cells_of_other) const {
-  std::vector<Index> cells;
-  if (is_empty_) return cells;
-  for (const Index c : cells_of_other)
-    cells.push_back(tree_.site(tree_.nearest(cell_center(other, other.positions, static_cast<std::size_t>(c))).place));
-  return ascending(std::move(cells));
-}
-
-std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double> sizes) {
-  if (sizes.empty()) return {};
-  std::vector<double> sums(mesh.num_vertices(), 0);
-  std::vector<int> counts(mesh.num_vertices(), 0);
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    for (const Index v : mesh.cell(c)) {
-      sums[v] += sizes[c];
-      ++counts[v];
-    }
-  for (std::size_t v = 0; v < sums.size(); ++v) sums[v] = counts[v] > 0 ? sums[v] / counts[v] : 1;
-  return sums;
 }
 
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes) {
@@ -185,17 +128,6 @@ void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, double shar
     for (int k = 0; k < 3; ++k)
       if (own[k] > 0 && own[k] < share * lengths[c][k]) lengths[c][k] = own[k];
   }
-}
-
-std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,
-                                   const SparseMap& samples) {
-  const double mean =
-      std::sqrt(sum_of_squared_sizes(topology, sizes) / static_cast<double>(topology.boundary_faces().size()));
-  std::vector<Vec3> at_vertices;
-  for (const double size : vertex_sizes(mesh, sizes)) at_vertices.push_back(Vec3::Constant(size));
-  std::vector<double> factors;
-  for (const Vec3& size : samples.apply(at_vertices)) factors.push_back(std::pow(mean / size.x(), 3));
-  return factors;
 }
 
 }  // namespace subvol::internal

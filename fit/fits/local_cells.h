@@ -2,10 +2,8 @@
 #pragma once
 
 #include "subvol/fit/features/quality_caps.h"
-#include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
-#include "subvol/subdivision/sparse_map.h"
 #include "subvol/templates/search_stop.h"
 
 #include <cstddef>
@@ -39,38 +37,6 @@ std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<con
 /// Returns the mean of a cell's corners.  positions  of the mesh's vertices.
 Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t cell);
 
-/// Finds cells at the boundary of a mesh by points.
-class BoundaryCells {
- public:
-  /// positions  of the mesh's vertices, in the coordinates of the points.
-  BoundaryCells(const VolumeMesh& mesh, std::span<const Vec3> positions);
-
-  /// Returns the cells around the boundary vertices that are nearest to some points, ascending.
-  std::vector<Index> near(std::span<const Vec3> points) const;
-
- private:
-  std::vector<Index> vertices_;
-  std::vector<std::vector<Index>> cells_of_vertex_;
-  SiteTree tree_;
-};
-
-/// Finds cells of a mesh by the centers of other cells.
-class CellCenters {
- public:
-  /// positions  of the mesh's vertices, in the coordinates of the other mesh.
-  CellCenters(const VolumeMesh& mesh, std::span<const Vec3> positions);
-
-  /// Returns the cells whose centers are nearest to those of some cells of another mesh, ascending.
-  std::vector<Index> nearest(const VolumeMesh& other, std::span<const Index> cells_of_other) const;
-
- private:
-  bool is_empty_;
-  SiteTree tree_;
-};
-
-/// Returns the mean size of the cells at each vertex; empty if the sizes are.
-std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double> sizes);
-
 /// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if
 /// the sizes are.
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
@@ -97,11 +63,5 @@ std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const d
 /// share    cells are flat if an edge is shorter than this share of the wanted length (`QualityWeights::least_edge`).
 /// lengths  of the mesh's cells.
 void keep_flat_cells(const VolumeMesh& grid, const VolumeMesh& mesh, double share, std::span<Vec3> lengths);
-
-/// Returns how many times links of creases count at each sample (`CreaseEnergy::weigh`). `QualityStages` measure
-/// distances in units of the cells: a face counts as much as another one, whatever its size, and so must an edge.
-/// sizes    of the cells, not empty.  samples  vertices -> samples.
-std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,
-                                   const SparseMap& samples);
 
 }  // namespace subvol::internal

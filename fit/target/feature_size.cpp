@@ -69,13 +69,4 @@ std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, co
   return largest;
 }
 
-std::vector<Vec3> missed_feature_points(const FeatureSizes& features, const ClosestPoint& fitted, double share) {
-  std::vector<ClosestPoint::Hit> hits(features.points.size());
-  fitted.closest(features.points, hits);
-  std::vector<Vec3> missed;
-  for (std::size_t i = 0; i < hits.size(); ++i)
-    if (hits[i].distance > share * features.sizes[i]) missed.push_back(features.points[i]);
-  return missed;
-}
-
 }  // namespace subvol

@@ -51,7 +51,4 @@ struct FeatureMiss {
 /// there are no features. InputError: as `ClosestPoint::closest`.
 std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, const ClosestPoint& fitted);
 
-/// Returns the points of features that are farther from a fitted surface than this share of their size, in their order.
-std::vector<Vec3> missed_feature_points(const FeatureSizes& features, const ClosestPoint& fitted, double share);
-
 }  // namespace subvol

@@ -57,15 +57,6 @@ TEST_CASE("creases on their curves cost nothing, and a shift across them what it
   bare.assign(c.samples.positions);
   const double expected = scale * 0.5 * 1e-4 * (2 * 8 * 2 + 24 * 0.5);
   CHECK(energy.value(z) - bare.value(z) == Approx(expected).epsilon(1e-5));
-
-  CreaseEnergy weighed(c.curves, c.segments, z.size(), 0.5, 0);
-  weighed.weigh(std::vector<double>(z.size(), 3));
-  ClosestPointEnergy thrice(target, c.samples.triangles, z.size(), 0, 1);
-  thrice.add_creases(weighed);
-  thrice.assign(c.samples.positions);
-  CHECK(thrice.value(z) - bare.value(z) == Approx(3 * expected).epsilon(1e-5));
-  CHECK_THROWS_AS(weighed.weigh({1, 2}), InputError);
-  CHECK_THROWS_AS(weighed.weigh(std::vector<double>(z.size(), 0)), InputError);
 }
 
 TEST_CASE("gradient and Hessian with creases agree with central differences") {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
-#include "subvol/mesh/mesh_topology.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/sample_meshes.h"
 
@@ -43,17 +42,6 @@ TEST_CASE("Faults that have no room are left out, the least important first", "[
   CHECK(!refined_at_faults(grid, {}, std::vector<Fault>{{}, {}}, 10000));
 }
 
-TEST_CASE("Cells are found by points near the boundary and by cells of another mesh", "[local_cells]") {
-  const VolumeMesh grid = test::lattice(4, 4, 4), other = test::lattice(2, 1, 1);
-  const BoundaryCells cells(grid, grid.positions);
-  CHECK(cells.near(std::vector<Vec3>{}).empty());
-  const Vec3 corner = grid.positions[grid.cell(0)[0]];
-  CHECK(cells.near(std::vector<Vec3>{corner, corner}).size() == 1);
-  const Vec3 on_face = (grid.positions[grid.cell(5)[0]].array() * Vec3(1, 1, 0).array()).matrix();
-  CHECK(cells.near(std::vector<Vec3>{on_face}).size() == 4);
-  CHECK(CellCenters(grid, grid.positions).nearest(other, std::vector<Index>{0, 0, 1}).size() == 2);
-}
-
 TEST_CASE("Cells between small and large ones have caps", "[local_cells]") {
   const VolumeMesh grid = test::lattice(5, 5, 5);
   QualityCaps caps;
@@ -77,9 +65,6 @@ TEST_CASE("Cells between small and large ones have caps", "[local_cells]") {
 TEST_CASE("Cells of pads are as large as those behind them", "[local_cells]") {
   const VolumeMesh grid = test::lattice(3, 1, 1);
   CHECK(padded_sizes(grid, {}).empty());
-  CHECK(vertex_sizes(grid, {}).empty());
   CHECK(padded_sizes(grid, std::vector<double>{0.5, 1}) == std::vector<double>{0.5, 1, 1});
   CHECK(padded_sizes(grid, std::vector<double>{1, 0.5}) == std::vector<double>{1, 0.5, 0.5});
-  const std::vector<double> sizes = vertex_sizes(grid, std::vector<double>{1, 0.5, 1});
-  CHECK(*std::ranges::min_element(sizes) == 0.75);
 }
