@@ -164,7 +164,7 @@ class Growing {
             {"thickness", cli::thickness_json(shell, diagonal_)},
             {"layers", cli::layers_json(shell)},
             {"border", cli::border_json(shell, diagonal_)},
-            {"groups", cli::shell_groups_json(shell)},
+            {"groups", cli::shell_groups_json(shell, given_.polygons)},
             {"surface_distance_max_percent", 100 * shell.surface_distance_max / diagonal_},
             {"quality", cli::quality_json(shell.quality)},
             {"corner_quality", cli::corner_quality_json(shell)},

@@ -269,7 +269,22 @@ Json border_json(const ShellResult& shell, double diagonal) {
           {"distance_max_percent", diagonal > 0 ? 100 * shell.border_distance_max / diagonal : 0}};
 }
 
-Json shell_groups_json(const ShellResult& shell) {
+namespace {
+
+/// Returns the area of each group of a surface's faces.
+std::vector<double> areas_of_groups(const PolygonMesh& surface) {
+  std::vector<double> areas(surface.face_groups.groups.size(), 0);
+  std::vector<Index> face_of_triangle;
+  const TriangleMesh triangles = triangulate(surface, &face_of_triangle);
+  for (std::size_t t = 0; t < triangles.triangles.size(); ++t)
+    if (const Index group = surface.face_groups.of_face[face_of_triangle[t]]; group != kNoIndex)
+      areas[group] += triangle_area(triangles, triangles.triangles[t]);
+  return areas;
+}
+
+}  // namespace
+
+Json shell_groups_json(const ShellResult& shell, const PolygonMesh& given) {
   const VolumeFaceGroups& groups = shell.mesh.face_groups;
   std::vector<std::size_t> faces(groups.groups.size(), 0);
   std::vector<double> areas(groups.groups.size(), 0);
@@ -283,12 +298,17 @@ Json shell_groups_json(const ShellResult& shell) {
     for (std::size_t k = 1; k + 1 < corners.size(); ++k)
       areas[group] += (x(k) - x(0)).cross(x(k + 1) - x(0)).norm() / 2;
   }
+  const std::vector<Group>& given_groups = given.face_groups.groups;
+  const std::vector<double> given_areas = given_groups.empty() ? std::vector<double>() : areas_of_groups(given);
   Json json = Json::array();
-  for (std::size_t g = 0; g < faces.size(); ++g)
+  for (std::size_t g = 0; g < faces.size(); ++g) {
     json.push_back({{"name", as_utf8(groups.groups[g].name)},
                     {"number", groups.groups[g].number},
                     {"area", areas[g]},
                     {"faces", faces[g]}});
+    const auto same = std::ranges::find(given_groups, groups.groups[g]);
+    if (same != given_groups.end()) json.back()["target_area"] = given_areas[same - given_groups.begin()];
+  }
   return json;
 }
 

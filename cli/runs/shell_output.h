@@ -35,8 +35,9 @@ Json thickness_json(const ShellResult& shell, double diagonal);
 Json layers_json(const ShellResult& shell);
 /// Columns that stay in planes of the border, and their largest distance from them.
 Json border_json(const ShellResult& shell, double diagonal);
-/// The groups of the shell's faces: name, number, number of faces and area.
-Json shell_groups_json(const ShellResult& shell);
+/// The groups of the shell's faces: name, number, number of faces and area; those of the given surface also have their
+/// area there.
+Json shell_groups_json(const ShellResult& shell, const PolygonMesh& given);
 /// Scaled Jacobian at the corners of the linear cells, relative to the ideal cells.
 Json corner_quality_json(const ShellResult& shell);
 /// Warnings about sides whose layers are much thinner than asked for, or whose first layer is, on average, more than a

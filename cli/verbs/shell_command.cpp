@@ -249,7 +249,7 @@ Json ShellRun::report() const {
             {"thickness", thickness_json(result_, diagonal_)},
             {"layers", layers_json(result_)},
             {"border", border_json(result_, diagonal_)},
-            {"groups", shell_groups_json(result_)},
+            {"groups", shell_groups_json(result_, given_.polygons)},
             {"surface_distance_max_percent", 100 * result_.surface_distance_max / diagonal_},
             {"quality", quality_json(result_.quality)},
             {"corner_quality", corner_quality_json(result_)},

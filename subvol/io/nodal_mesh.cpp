@@ -52,6 +52,9 @@ bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
   return true;
 }
 
+/// Numbers of nodes of cells of order 2 that lack some (`NodalCells`).
+constexpr std::size_t kStraightPrism = 12, kHexWithSides = 24;
+
 }  // namespace
 
 std::vector<int> internal::mirrored_places(CellKind kind, int order) {
@@ -81,7 +84,9 @@ const std::vector<int>& NodalCells::places(CellKind kind, int order, NodeOrderin
 }
 
 void NodalCells::add(CellKind kind, int order, NodeOrdering ordering, std::span<const Index> nodes) {
-  assert(is_size(kind, order, nodes.size()));
+  assert(is_size(kind, order, nodes.size()) ||
+         (order == 2 && ordering == NodeOrdering::vtk &&
+          nodes.size() == (kind == CellKind::hex ? kHexWithSides : kStraightPrism)));
   std::vector<Index> cell;
   for (const int place : places(kind, order, ordering))
     if (static_cast<std::size_t>(place) < nodes.size()) cell.push_back(nodes[static_cast<std::size_t>(place)]);
@@ -106,10 +111,22 @@ Index NodalCells::center(std::span<const Index> corners, std::span<const Index> 
   return static_cast<Index>(mesh_.positions.size() - 1);
 }
 
+/// The same, once for all cells with these corners of an edge or a face.
+Index NodalCells::shared_center(std::span<const Index> corners, std::span<const Index> middles, double corner_weight,
+                                double middle_weight) {
+  const auto [known, is_new] = centers_.try_emplace(face_key(corners), kNoIndex);
+  if (is_new) known->second = center(corners, middles, corner_weight, middle_weight);
+  return known->second;
+}
+
 // VTK lists the nodes of a cell of order 2 by corners, edges, faces with an inside, and the inside of a hex.
 void NodalCells::complete(CellKind kind, std::vector<Index>& nodes) {
   const std::vector<LatticePoint> lattice = cell_lattice(kind, 2, NodeOrdering::vtk);
-  const auto corners = static_cast<std::size_t>(cell_topology(kind).num_vertices), given = nodes.size();
+  const auto corners = static_cast<std::size_t>(cell_topology(kind).num_vertices);
+  if (nodes.size() == kStraightPrism)
+    for (const Index v : {0, 1, 2})
+      nodes.push_back(shared_center(std::array{nodes[v], nodes[v + 3]}, std::span<const Index>(), 0.5, 0));
+  const std::size_t given = nodes.size();
   for (std::size_t q = given; q < lattice.size(); ++q) {
     const LatticePoint& at = lattice[q];
     std::vector<Index> face_corners, middles;
@@ -121,13 +138,14 @@ void NodalCells::complete(CellKind kind, std::vector<Index>& nodes) {
     };
     for (std::size_t i = 0; i < given; ++i)
       if (same_face(lattice[i])) (i < corners ? face_corners : middles).push_back(nodes[i]);
-    if (face_corners.size() != 4) {
+    if (face_corners.size() == 4) {
+      nodes.push_back(shared_center(face_corners, middles, -0.25, 0.5));
+    } else if (given == kHexWithSides) {  // the middle of the quad through the middles of the upright edges and sides
+      const std::span<const Index> upright = std::span(nodes).subspan(16, 4), sides = std::span(nodes).subspan(20, 4);
+      nodes.push_back(center(upright, sides, -0.25, 0.5));
+    } else {
       nodes.push_back(center(face_corners, middles, -0.25, 0.25));  // 8 corners and 12 edges of a hex
-      continue;
     }
-    const auto [known, is_new] = face_centers_.try_emplace(face_key(face_corners), kNoIndex);
-    if (is_new) known->second = center(face_corners, middles, -0.25, 0.5);
-    nodes.push_back(known->second);
   }
 }
 

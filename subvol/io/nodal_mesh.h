@@ -51,28 +51,36 @@ struct NodalMesh {
 
 /// Appends cells to a NodalMesh, whatever the order of their nodes.
 ///
-/// A cell of order 2 may lack its nodes inside faces and cells (20 nodes of a hex, 15 of a prism). They are added where
-/// the polynomial of such a cell has them, so that the cell is the same: the middle of a quad is at half the sum of the
-/// middles of its edges less a quarter of the sum of its corners.
+/// A cell of order 2 may lack nodes at the end of VTK's order, which are added where the polynomial of such a cell has
+/// them, so that the cell is the same:
+///
+///   20 of a hex    without the insides of faces and of the cell
+///   15 of a prism  without the insides of faces
+///   24 of a hex    without the insides of the bottom, the top and the cell; only in VTK's ordering
+///   12 of a prism  without the insides of faces, and straight from the bottom to the top; only in VTK's ordering
+///
+/// The middle of a quad is at half the sum of the middles of its edges less a quarter of the sum of its corners.
 class NodalCells {
  public:
   explicit NodalCells(NodalMesh& mesh) : mesh_(mesh) {}
 
-  /// Appends a cell. nodes: all of its grid in the given ordering, or the first 20 or 15 of order 2 as above; all
+  /// Appends a cell. nodes: all of its grid in the given ordering, or the first ones of order 2 as above; all
   /// must be in range of the positions (asserted).
   void add(CellKind kind, int order, NodeOrdering ordering, std::span<const Index> nodes);
-  /// Returns true if a cell of this kind and order may have so many nodes.
+  /// Returns true if a cell of this kind and order may have so many nodes in any ordering.
   static bool is_size(CellKind kind, int order, std::size_t num_nodes);
 
  private:
   const std::vector<int>& places(CellKind kind, int order, NodeOrdering ordering);
   Index center(std::span<const Index> corners, std::span<const Index> middles, double corner_weight,
                double middle_weight);
+  Index shared_center(std::span<const Index> corners, std::span<const Index> middles, double corner_weight,
+                      double middle_weight);
   void complete(CellKind kind, std::vector<Index>& nodes);
 
   NodalMesh& mesh_;
   std::map<std::tuple<CellKind, int, NodeOrdering>, std::vector<int>> places_;
-  std::map<FaceKey, Index> face_centers_;
+  std::map<FaceKey, Index> centers_;  ///< of quads, and of edges that lack their middles
 };
 
 /// Reads cells of any order; the extension chooses the format (docs/file-formats.md).

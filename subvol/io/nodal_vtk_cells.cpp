@@ -36,7 +36,9 @@ const std::vector<FixedCell>& fixed_cells() {
       {25, CellKind::hex, 2, 20, {}},
       {26, CellKind::prism, 2, 15, {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13}},
       {29, CellKind::hex, 2, 27, {}},
+      {31, CellKind::prism, 2, 12, {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9}},
       {32, CellKind::prism, 2, 18, {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13, 17, 16, 15}},
+      {33, CellKind::hex, 2, 24, {}},
   };
   return kCells;
 }
@@ -46,14 +48,15 @@ constexpr int kLowerDimensions[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 3
 
 /// Why a type cannot be read.
 std::string refusal(int type) {
-  const auto is = [&](std::initializer_list<int> types) { return std::find(types.begin(), types.end(), type) !=
-                                                                 types.end(); };
+  const auto is = [&](std::initializer_list<int> types) {
+    return std::find(types.begin(), types.end(), type) != types.end();
+  };
   const std::string text = "has VTK type " + std::to_string(type);
   if (is({27, 37, 74, 81})) return std::string("is a curved pyramid: ") + kNoCurvedPyramids;
   if (is({41, 42, 15, 16})) return text + ", a polyhedron, which is not read";
   return text +
-         ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), 14 (pyramid), the quadratic forms 24, 25, 26, 29 and "
-         "32, Lagrange cells 71, 72 and 73, or Bezier cells 78, 79 and 80";
+         ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), 14 (pyramid), the quadratic forms 24, 25, 26, 29, "
+         "31, 32 and 33, Lagrange cells 71, 72 and 73, or Bezier cells 78, 79 and 80";
 }
 
 /// A cell of any order, by its first type; Bezier cells are numbered alike.

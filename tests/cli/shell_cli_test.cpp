@@ -79,6 +79,11 @@ TEST_CASE("Groups of a surface arrive on its shell, and can be left out by name,
   CHECK(groups.size() == 7);
   CHECK(groups["top"] == 1);
   CHECK(groups["outer"] == 6);
+  for (const auto& group : place.json("r.json")["groups"]) {
+    if (group["name"] == "outer") CHECK_FALSE(group.contains("target_area"));
+    if (group["name"] == "outer") continue;
+    CHECK(group["area"].get<double>() == Approx(group["target_area"].get<double>()));
+  }
   CHECK(has(content_of(place / "a.msh"), "\"outer\""));
   CHECK(has(content_of(place / "a.msh"), "\"left\""));
 

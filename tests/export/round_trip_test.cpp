@@ -23,21 +23,24 @@ using namespace subvol::test;
 
 namespace {
 
-constexpr int kNumGroups = 2;
-
-VolumeMesh marked_cells() {
-  VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
+/// Cells with groups of faces and regions.
+VolumeMesh marked(VolumeMesh cells) {
+  double height = 0;
+  for (const Vec3& p : cells.positions) height = std::max(height, p.z());
+  VolumeMesh mesh = with_floor_and_roof(std::move(cells), height);
   mesh.references.assign(mesh.num_cells(), 4);
   mesh.references.back() = 7;
   mesh.regions = {{"steel", 4, 3}, {"brass", 7, 3}};
   return mesh;
 }
 
-std::vector<const FileFormat*> formats_of_cells(bool curved) {
+/// Returns the formats that are read and written with cells of an order: 1, 2 or more.
+std::vector<const FileFormat*> formats_of_cells(int order) {
   std::vector<const FileFormat*> formats;
   for (const FileFormat& format : file_formats()) {
     if (!format.holds_cells || format.read.empty() || format.written.empty()) continue;
-    if (curved && (format.orders_written == "1" || format.orders_read == "1")) continue;
+    if (order > 1 && (format.orders_written == "1" || format.orders_read == "1")) continue;
+    if (order > 2 && format.has_quadratic_cells_at_most()) continue;
     if (format.needs_netcdf && !has_exodus()) continue;
     formats.push_back(&format);
   }
@@ -65,9 +68,8 @@ using Corners = std::vector<std::array<double, 3>>;
 Corners corners_of(const std::vector<Vec3>& positions, std::span<const Index> cell, const std::vector<Vec3>& wanted) {
   Corners corners;
   for (const Index v : cell) {
-    const auto nearest = std::ranges::min_element(wanted, {}, [&](const Vec3& x) {
-      return (x - positions[static_cast<std::size_t>(v)]).squaredNorm();
-    });
+    const auto nearest = std::ranges::min_element(
+        wanted, {}, [&](const Vec3& x) { return (x - positions[static_cast<std::size_t>(v)]).squaredNorm(); });
     corners.push_back({(*nearest)[0], (*nearest)[1], (*nearest)[2]});
   }
   std::sort(corners.begin(), corners.end());
@@ -78,14 +80,22 @@ std::string mark_of(const Group& group, Held held) {
   return held == Held::none ? "" : held == Held::names ? group.name : std::to_string(group.number);
 }
 
-/// The groups of each grouped face, by its corners.
+/// Returns the largest number of a group that has faces.
+int largest_number(const VolumeFaceGroups& groups) {
+  int largest = 0;
+  for (const GroupedFace& entry : groups.faces)
+    largest = std::max(largest, groups.groups[static_cast<std::size_t>(entry.group)].number);
+  return largest;
+}
+
+/// The groups of each grouped face, by its corners.  most: largest number of a group that counts. MFEM gives a number
+/// to all faces of the boundary: those of no group have one more.
 std::map<Corners, std::set<std::string>> faces_of(const VolumeMesh& mesh, const VolumeFaceGroups& groups,
-                                                  const std::vector<Vec3>& wanted, Held held) {
+                                                  const std::vector<Vec3>& wanted, Held held, int most) {
   std::map<Corners, std::set<std::string>> faces;
   if (held == Held::none) return faces;
   for (const GroupedFace& entry : groups.faces) {
-    // MFEM gives a number to all faces of the boundary: those of no group have one more.
-    if (groups.groups[static_cast<std::size_t>(entry.group)].number > kNumGroups) continue;
+    if (groups.groups[static_cast<std::size_t>(entry.group)].number > most) continue;
     const std::size_t size = entry.face.back() == kNoIndex ? 3 : 4;
     faces[corners_of(mesh.positions, std::span(entry.face).first(size), wanted)].insert(
         mark_of(groups.groups[static_cast<std::size_t>(entry.group)], held));
@@ -125,13 +135,12 @@ std::vector<std::size_t> matched(const HighOrderMesh& found, const HighOrderMesh
   return result;
 }
 
-}  // namespace
-
-TEST_CASE("round trips: linear cells, regions and groups go through every pair of formats", "[export][slow]") {
+/// Sends linear cells through every pair of formats and back.
+void check_round_trips(const VolumeMesh& mesh) {
   const TemporaryFolder folder;
-  const VolumeMesh mesh = marked_cells();
-  const auto formats = formats_of_cells(false);
+  const auto formats = formats_of_cells(1);
   REQUIRE(formats.size() >= 7);
+  const int most = largest_number(mesh.face_groups);
   for (const FileFormat* a : formats) {
     const auto first = folder.path() / ("a" + std::string(a->extension));
     write_linear(first, mesh);
@@ -149,31 +158,29 @@ TEST_CASE("round trips: linear cells, regions and groups go through every pair o
       const Held groups = groups_of(*a, *b), regions = regions_of(*a, *b);
       CHECK(cells_of(found, found.references, found.regions, mesh.positions, regions) ==
             cells_of(mesh, mesh.references, mesh.regions, mesh.positions, regions));
-      CHECK(faces_of(found, found.face_groups, mesh.positions, groups) ==
-            faces_of(mesh, mesh.face_groups, mesh.positions, groups));
+      CHECK(faces_of(found, found.face_groups, mesh.positions, groups, most) ==
+            faces_of(mesh, mesh.face_groups, mesh.positions, groups, most));
     }
   }
 }
 
-TEST_CASE("round trips: cells of order 2 go through every pair of formats that holds them", "[export][slow]") {
+/// Sends curved cells through every pair of some formats and back.  cells: their groups and regions.
+void check_round_trips(const HighOrderMesh& mesh, const VolumeMesh& cells, std::span<const FileFormat* const> formats,
+                       double tolerance) {
   const TemporaryFolder folder;
-  PointSource source(5);
-  const VolumeMesh cells = marked_cells();
-  // Without modes of faces and inside, which C3D20 and the like do not have.
-  const HighOrderMesh mesh = file_cells(random_mesh(ElementSpace(cells, Basis::legendre, 2), source), ".inp").mesh;
   const HighOrderFileOptions options{
       .references = cells.references, .face_groups = &cells.face_groups, .regions = cells.regions};
-  const auto formats = formats_of_cells(true);
-  REQUIRE(formats.size() >= 5);
   const auto write_file = [](const std::filesystem::path& path, const HighOrderFile& file) {
     write_volume(path, file.mesh,
                  {.references = file.references, .face_groups = &file.face_groups, .regions = file.regions});
   };
+  const VolumeMesh straight = mesh.straight_sided();
+  const int most = largest_number(cells.face_groups);
   for (const FileFormat* a : formats) {
     const auto first = folder.path() / ("a" + std::string(a->extension));
     write_volume(first, mesh, options);
     for (const FileFormat* b : formats) {
-      CAPTURE(a->extension, b->extension);
+      CAPTURE(a->extension, b->extension, mesh.space.max_order());
       const auto second = folder.path() / ("b" + std::string(b->extension)),
                  third = folder.path() / ("c" + std::string(a->extension));
       write_file(second, read_curved(first));
@@ -181,18 +188,52 @@ TEST_CASE("round trips: cells of order 2 go through every pair of formats that h
       const HighOrderFile found = read_curved(third);
       const VolumeMesh corners = found.mesh.straight_sided();
       REQUIRE(found.mesh.space.num_cells() == cells.num_cells());
-      CHECK(found.mesh.space.max_order() == 2);
+      CHECK(found.mesh.space.max_order() == mesh.space.max_order());
       const Held groups = groups_of(*a, *b), regions = regions_of(*a, *b);
-      const VolumeMesh straight = mesh.straight_sided();
       CHECK(cells_of(corners, found.references, found.regions, straight.positions, regions) ==
             cells_of(straight, cells.references, cells.regions, straight.positions, regions));
-      CHECK(faces_of(corners, found.face_groups, straight.positions, groups) ==
-            faces_of(straight, cells.face_groups, straight.positions, groups));
+      CHECK(faces_of(corners, found.face_groups, straight.positions, groups, most) ==
+            faces_of(straight, cells.face_groups, straight.positions, groups, most));
       const std::vector<std::size_t> same = matched(found.mesh, mesh);
       for (std::size_t c = 0; c < same.size(); ++c) {
         const auto at = [&](const HighOrderMesh& m, std::size_t cell) { return m.position(cell, Vec3(0.3, 0.3, 0.3)); };
-        CHECK((at(found.mesh, c) - at(mesh, same[c])).norm() < 1e-12 + 10 * rounding(*a, *b));
+        CHECK((at(found.mesh, c) - at(mesh, same[c])).norm() < tolerance + 10 * rounding(*a, *b));
       }
     }
   }
+}
+
+}  // namespace
+
+TEST_CASE("round trips: linear cells, regions and groups go through every pair of formats", "[export][slow]") {
+  check_round_trips(marked(mixed_cells()));
+}
+
+TEST_CASE("round trips: pyramids go through every pair of formats", "[export][slow]") {
+  check_round_trips(marked(mixed_cells_with_pyramid()));
+}
+
+TEST_CASE("round trips: cells of order 2 go through every pair of formats that holds them", "[export][slow]") {
+  PointSource source(5);
+  const VolumeMesh cells = marked(mixed_cells());
+  const auto formats = formats_of_cells(2);
+  REQUIRE(formats.size() >= 5);
+  // Without modes of faces and inside, which C3D20 and the like do not have.
+  const HighOrderMesh mesh = file_cells(random_mesh(ElementSpace(cells, Basis::legendre, 2), source), ".inp").mesh;
+  check_round_trips(mesh, cells, formats, 1e-12);
+}
+
+TEST_CASE("round trips: cells of orders 3 to 9 go through every pair of formats that holds them", "[export][slow]") {
+  const int order = GENERATE(3, 6, 9);
+  PointSource source(7);
+  const double tolerance = order == 3 ? 1e-12 : order == 6 ? 1e-11 : 1e-9;  // through points at equal steps
+  std::vector<const FileFormat*> formats = formats_of_cells(order);
+  REQUIRE(formats.size() >= 3);
+  const VolumeMesh hexes = marked(test::lattice(2, 1, 2));
+  check_round_trips(random_mesh(ElementSpace(hexes, Basis::legendre, order), source), hexes, formats, tolerance);
+  std::erase_if(formats,
+                [](const FileFormat* f) { return f->extension == ".msh"; });  // its prisms have order 2 at most
+  REQUIRE(formats.size() >= 2);
+  const VolumeMesh mixed = marked(mixed_cells());
+  check_round_trips(random_mesh(ElementSpace(mixed, Basis::legendre, order), source), mixed, formats, tolerance);
 }

@@ -114,10 +114,10 @@ TEST_CASE(
   PatchGroups groups = patch_groups(MeshTopology(cube), patched.patches, cube.positions, target, features);
   add_pads(patched, features);
   const std::size_t patches = patched.patches.count;
-  const std::vector<double> lengths(features.curves.curves.size(), 0.5);
 
   const std::size_t cells = patched.mesh.num_cells();
-  const NarrowStrips strips = follow_narrow_strips(patched, routing, groups, target, features, lengths);
+  const double h = 0.5;
+  const NarrowStrips strips = follow_narrow_strips(patched, routing, groups, target, features, h);
   CHECK(strips.num_followed == 4);
   CHECK(strips.pads.size() == (layers == 1 ? 1 : 0));
   CHECK(patched.mesh.num_cells() == cells + (layers == 1 ? 16 : 0));
@@ -181,8 +181,7 @@ TEST_CASE(
   PatchedMesh patched = patched_mesh(cube, cube.positions, routing, target);
   PatchGroups groups = patch_groups(MeshTopology(cube), patched.patches, cube.positions, target, features);
   const std::size_t cells = patched.mesh.num_cells(), unfollowed = routing.unfollowed.size();
-  const std::vector<double> lengths(features.curves.curves.size(), length);
-  CHECK(follow_narrow_strips(patched, routing, groups, target, features, lengths).num_followed == 0);
+  CHECK(follow_narrow_strips(patched, routing, groups, target, features, length).num_followed == 0);
   CHECK(patched.mesh.num_cells() == cells);
   CHECK(routing.unfollowed.size() == unfollowed);
 }

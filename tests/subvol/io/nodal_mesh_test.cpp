@@ -2,15 +2,18 @@
 #include "subvol/io/nodal_mesh.h"
 
 #include "subvol/base/base64.h"
+#include "subvol/base/format.h"
+#include "subvol/io/cell_lattice.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/mfem_numbering.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/io/node_points.h"
 #include "tests/support/nodal_fixtures.h"
 
-#include <catch2/catch.hpp>
 #include <zlib.h>
+#include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -90,19 +93,34 @@ TEST_CASE("nodal_mesh: binary files of Gmsh", "[io]") {
   const NodalMesh mesh = read_nodal_text("a.msh", old);
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{6});
-  const std::string recent =
-      "$MeshFormat\n4.1 1 8\n" + raw<std::int32_t>({1}) + "\n$EndMeshFormat\n$Entities\n" +
-      raw<std::uint64_t>({0, 0, 0, 1}) + raw<std::int32_t>({1}) + raw<double>({0, 0, 0, 1, 1, 1}) +
-      raw<std::uint64_t>({1}) + raw<std::int32_t>({7}) + raw<std::uint64_t>({0}) + "\n$EndEntities\n$Nodes\n" +
-      raw<std::uint64_t>({1, 4, 3, 9}) + raw<std::int32_t>({3, 1, 0}) + raw<std::uint64_t>({4, 9, 3, 5, 4}) +
-      raw<double>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}) + "\n$EndNodes\n$Elements\n" +
-      raw<std::uint64_t>({1, 1, 1, 1}) + raw<std::int32_t>({3, 1, 4}) + raw<std::uint64_t>({1, 2, 9, 3, 5, 4}) +
-      "\n$EndElements\n";
+  const std::string recent = "$MeshFormat\n4.1 1 8\n" + raw<std::int32_t>({1}) + "\n$EndMeshFormat\n$Entities\n" +
+                             raw<std::uint64_t>({0, 0, 0, 1}) + raw<std::int32_t>({1}) +
+                             raw<double>({0, 0, 0, 1, 1, 1}) + raw<std::uint64_t>({1}) + raw<std::int32_t>({7}) +
+                             raw<std::uint64_t>({0}) + "\n$EndEntities\n$Nodes\n" + raw<std::uint64_t>({1, 4, 3, 9}) +
+                             raw<std::int32_t>({3, 1, 0}) + raw<std::uint64_t>({4, 9, 3, 5, 4}) +
+                             raw<double>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}) + "\n$EndNodes\n$Elements\n" +
+                             raw<std::uint64_t>({1, 1, 1, 1}) + raw<std::int32_t>({3, 1, 4}) +
+                             raw<std::uint64_t>({1, 2, 9, 3, 5, 4}) + "\n$EndElements\n";
   const NodalMesh other = read_nodal_text("b.msh", recent);
   require_unit_tet(other);
   CHECK(other.references == std::vector<int>{7});
   for (std::size_t size = 0; size < recent.size(); size += 7)
     CHECK_FALSE(nodal_refusal("c.msh", std::string_view(recent).substr(0, size)).empty());
+  // In 4.0, each node follows its tag, the dimension of a block follows its entity, and tags are short.
+  const std::string between =
+      "$MeshFormat\n4 1 8\n" + raw<std::int32_t>({1}) + "\n$EndMeshFormat\n$Entities\n" +
+      raw<std::uint64_t>({0, 0, 0, 1}) + raw<std::int32_t>({1}) + raw<double>({0, 0, 0, 1, 1, 1}) +
+      raw<std::uint64_t>({1}) + raw<std::int32_t>({7}) + raw<std::uint64_t>({0}) + "\n$EndEntities\n$Nodes\n" +
+      raw<std::uint64_t>({1, 4}) + raw<std::int32_t>({1, 3, 0}) + raw<std::uint64_t>({4}) + raw<std::int32_t>({9}) +
+      raw<double>({0, 0, 0}) + raw<std::int32_t>({3}) + raw<double>({1, 0, 0}) + raw<std::int32_t>({5}) +
+      raw<double>({0, 1, 0}) + raw<std::int32_t>({4}) + raw<double>({0, 0, 1}) + "\n$EndNodes\n$Elements\n" +
+      raw<std::uint64_t>({1, 1}) + raw<std::int32_t>({1, 3, 4}) + raw<std::uint64_t>({1}) +
+      raw<std::int32_t>({2, 9, 3, 5, 4}) + "\n$EndElements\n";
+  const NodalMesh third = read_nodal_text("d.msh", between);
+  require_unit_tet(third);
+  CHECK(third.references == std::vector<int>{7});
+  for (std::size_t size = 0; size < between.size(); size += 7)
+    CHECK_FALSE(nodal_refusal("e.msh", std::string_view(between).substr(0, size)).empty());
 }
 
 TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]") {
@@ -124,9 +142,33 @@ TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]")
 
 namespace {
 
+enum class Compressor { none, zlib, lz4 };
+
 struct Encoding {
-  bool appended, base64, compressed, wide_header;
+  bool appended, base64;
+  Compressor compressor;
+  bool wide_header;
 };
+
+std::string packed_by_zlib(const std::string& bytes) {
+  std::string packed(compressBound(bytes.size()), '\0');
+  uLongf size = packed.size();
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  packed.resize(size);
+  return packed;
+}
+
+/// Returns a block of LZ4 that repeats nothing: one sequence of literals.
+std::string packed_by_lz4(const std::string& bytes) {
+  constexpr std::size_t kInToken = 15, kInByte = 255;  // lengths from which on more bytes hold the rest
+  std::string packed(1, static_cast<char>(std::min(bytes.size(), kInToken) << 4));
+  if (bytes.size() >= kInToken) {
+    std::size_t rest = bytes.size() - kInToken;
+    for (; rest >= kInByte; rest -= kInByte) packed += '\xff';
+    packed += static_cast<char>(rest);
+  }
+  return packed + bytes;
+}
 
 /// The unit tet with a cell array of references, encoded in one of the ways that VTK has.
 std::string vtu(const Encoding& how) {
@@ -142,18 +184,15 @@ std::string vtu(const Encoding& how) {
   };
   const auto put = [&](const std::string& attributes, const std::string& bytes) {
     std::string content;
-    if (how.compressed) {  // two blocks, the second of them smaller
+    if (how.compressor != Compressor::none) {  // two blocks, the second of them smaller
       const std::size_t block = bytes.size() / 2 + 1;
       std::vector<std::string> parts{bytes.substr(0, block), bytes.substr(block)};
       if (parts[1].empty()) parts.pop_back();
       std::string lengths = header(parts.size()) + header(block) + header(bytes.size() - block), data;
       for (const std::string& part : parts) {
-        std::string packed(compressBound(part.size()), '\0');
-        uLongf size = packed.size();
-        compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(part.data()),
-                 part.size());
-        lengths += header(size);
-        data += packed.substr(0, size);
+        const std::string packed = how.compressor == Compressor::zlib ? packed_by_zlib(part) : packed_by_lz4(part);
+        lengths += header(packed.size());
+        data += packed;
       }
       content = encode(lengths) + encode(data);
     } else {
@@ -165,10 +204,13 @@ std::string vtu(const Encoding& how) {
     appended += content;
     return array;
   };
-  std::string text = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
-                                 "byte_order=\"LittleEndian\" header_type=\"") +
+  std::string text = std::string(
+                         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+                         "byte_order=\"LittleEndian\" header_type=\"") +
                      (how.wide_header ? "UInt64\"" : "UInt32\"") +
-                     (how.compressed ? " compressor=\"vtkZLibDataCompressor\"" : "") +
+                     (how.compressor == Compressor::zlib  ? " compressor=\"vtkZLibDataCompressor\""
+                      : how.compressor == Compressor::lz4 ? " compressor=\"vtkLZ4DataCompressor\""
+                                                          : "") +
                      "><UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points>";
   text += put("type=\"Float32\" NumberOfComponents=\"3\"", raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
   text += "</Points><Cells>" + put("type=\"Int32\" Name=\"connectivity\"", raw<std::int32_t>({0, 1, 2, 3}));
@@ -187,11 +229,16 @@ std::string vtu(const Encoding& how) {
 TEST_CASE("nodal_mesh: VTK XML in every encoding", "[io]") {
   for (const bool appended : {false, true})
     for (const bool base64 : {false, true})
-      for (const bool compressed : {false, true})
+      for (const Compressor compressor : {Compressor::none, Compressor::zlib, Compressor::lz4})
         for (const bool wide : {false, true}) {
           if (!appended && !base64) continue;  // there are no raw data within XML
-          CAPTURE(appended, base64, compressed, wide);
-          const std::string text = vtu({appended, base64, compressed, wide});
+          CAPTURE(appended, base64, static_cast<int>(compressor), wide);
+          const std::string text = vtu({appended, base64, compressor, wide});
+          if (compressor == Compressor::lz4 && !nodal_refusal("a.vtu", text).empty()) {
+            CHECK_THAT(nodal_refusal("a.vtu", text), Contains("built without"));
+            WARN("SKIPPED: LZ4, which the library was built without (liblz4-dev)");
+            continue;
+          }
           const NodalMesh mesh = read_nodal_text("a.vtu", text);
           require_unit_tet(mesh);
           CHECK(mesh.references == std::vector<int>{12});
@@ -200,13 +247,52 @@ TEST_CASE("nodal_mesh: VTK XML in every encoding", "[io]") {
 }
 
 TEST_CASE("nodal_mesh: blocks that claim to be huge are refused", "[io]") {
-  std::string text = vtu({true, false, true, true});
+  std::string text = vtu({true, false, Compressor::zlib, true});
   const std::size_t lengths = text.find("\n_") + 2;
   const std::uint64_t huge = std::uint64_t{1} << 40;
   std::memcpy(text.data() + lengths + 8, &huge, sizeof huge);
   CHECK_THAT(nodal_refusal("a.vtu", text), Contains("larger than its data can be"));
   CHECK_THAT(nodal_refusal("a.vtu", "<VTKFile"), Contains("not whole XML"));
   CHECK_THAT(nodal_refusal("a.vtu", "<VTKFile type=\"PolyData\"/>"), Contains("UnstructuredGrid"));
+}
+
+TEST_CASE("nodal_mesh: quadratic cells of VTK that lack some nodes", "[io]") {
+  // Types 31, a prism that is straight from the bottom to the top, and 33, a hex without the insides of two faces.
+  const auto text_of = [](int type, const std::vector<Vec3>& nodes) {
+    std::string text = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
+                       std::to_string(nodes.size()) + " double\n";
+    for (const Vec3& p : nodes) text += formatted("%.17g %.17g %.17g\n", p.x(), p.y(), p.z());
+    text += "CELLS 1 " + std::to_string(nodes.size() + 1) + "\n" + std::to_string(nodes.size());
+    for (std::size_t i = 0; i < nodes.size(); ++i) text += " " + std::to_string(i);
+    return text + "\nCELL_TYPES 1\n" + std::to_string(type) + "\n";
+  };
+  const auto require_map = [](const NodalMesh& mesh, CellKind kind, const auto& map) {
+    REQUIRE(mesh.num_cells() == 1);
+    REQUIRE(mesh.kinds[0] == kind);
+    REQUIRE(mesh.orders[0] == 2);
+    const std::vector<LatticePoint> lattice = cell_lattice(kind, 2, NodeOrdering::vtk);
+    REQUIRE(mesh.cell(0).size() == lattice.size());
+    for (std::size_t i = 0; i < lattice.size(); ++i)
+      CHECK((mesh.positions[mesh.cell(0)[i]] - map(lattice[i].cast<double>() / 2)).norm() < 1e-14);
+  };
+  // The polynomials of these cells hold all of degree 2, and the prism's all that are linear in w.
+  const auto curved = [](const Vec3& u) {
+    return Vec3(u + 0.1 * Vec3(u.y() * u.y(), u.z() * u.x(), u.x() * u.x() + u.y() * u.z()));
+  };
+  const auto upright = [](const Vec3& u) {
+    return Vec3(u + 0.1 * Vec3(u.y() * u.y(), u.x() * u.x() * u.z(), u.x() * u.y() * (1 + u.z())));
+  };
+  std::vector<Vec3> of_hex, of_prism;
+  const std::vector<LatticePoint> hex = cell_lattice(CellKind::hex, 2, NodeOrdering::vtk);
+  for (std::size_t i = 0; i < 24; ++i) of_hex.push_back(curved(hex[i].cast<double>() / 2));
+  // VTK's plain wedges have the other direction of rotation: the second and the third corner change places.
+  const Vec3 places[] = {{0, 0, 0},   {0, 1, 0},   {1, 0, 0},   {0, 0, 1},   {0, 1, 1},   {1, 0, 1},
+                         {0, 0.5, 0}, {.5, .5, 0}, {0.5, 0, 0}, {0, 0.5, 1}, {.5, .5, 1}, {0.5, 0, 1}};
+  for (const Vec3& u : places) of_prism.push_back(upright(u));
+  require_map(read_nodal_text("a.vtk", text_of(33, of_hex)), CellKind::hex, curved);
+  require_map(read_nodal_text("b.vtk", text_of(31, of_prism)), CellKind::prism, upright);
+  of_hex.pop_back();
+  CHECK_THAT(nodal_refusal("c.vtk", text_of(33, of_hex)), Contains("has 23 points, expected 24"));
 }
 
 // --- Abaqus ---------------------------------------------------------------------------------------------------------
@@ -216,7 +302,8 @@ TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files o
                       "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1.,0.,1.D0\n7,1,1,1\n8,0,1,1\n"
                       "9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n");
   const std::string text =
-      "*Heading\n*INCLUDE, INPUT=nodes.txt\n*Elset, elset=both\nupper, LOWER\n*Elset, elset=lower, generate\n10, 14, 2\n"
+      "*Heading\n*INCLUDE, INPUT=nodes.txt\n*Elset, elset=both\nupper, LOWER\n*Elset, elset=lower, generate\n10, 14, "
+      "2\n"
       "*Element, type=C3D8R, elset=Body\n10, 1,2,3,4,\n5,6,7,8\n20, 5,6,7,8, 9,10,11,12\n"
       "*Element, type=S4\n99, 1,2,3,4\n*Elset, elset=Upper\n20,\n"
       "*Solid Section, elset=upper, material=steel\n*Solid Section, elset=lower, material=wood\n,\n"
@@ -316,7 +403,8 @@ TEST_CASE("nodal_mesh: groups and references come back from a .inp", "[io]") {
   CHECK(inp_text(mesh).find("*NSET, NSET=inlet\n1, 2, 3\n") != std::string::npos);
   const NodalMesh mfem = read_nodal_text("b.mfem", mfem_text(mesh));
   CHECK(mfem.face_groups.faces.size() == 4);  // the boundary is listed whole
-  CHECK(group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 2}) != group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 3}));
+  CHECK(group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 2}) !=
+        group_of(mfem.face_groups, std::array<Index, 3>{0, 1, 3}));
 }
 
 TEST_CASE("Continuum shells are cells, and a .inp without parts may name instances", "[io][quick]") {
@@ -346,14 +434,16 @@ TEST_CASE("A file without cells is refused with what it has instead", "[io][quic
 // --- MFEM -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
-  const std::string head = "MFEM mesh v1.0\n\n# comment\ndimension\n3\n\nelements\n1\n4 4 0 1 2 3\n\nboundary\n1\n"
-                           "6 2 0 2 1\n\nvertices\n4\n";
+  const std::string head =
+      "MFEM mesh v1.0\n\n# comment\ndimension\n3\n\nelements\n1\n4 4 0 1 2 3\n\nboundary\n1\n"
+      "6 2 0 2 1\n\nvertices\n4\n";
   const NodalMesh mesh = read_nodal_text("a.mesh", head + "3\n" + kUnitTet);
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{4});
   CHECK(mesh.face_groups.groups == std::vector<Group>{{"", 6, 2}});
   CHECK(read_volume_mesh(nodal_folder() / "a.mesh").num_cells() == 1);
-  const std::string nodes = head + "\nnodes\nFiniteElementSpace\nFiniteElementCollection: H1_3D_P1\nVDim: 3\nOrdering: ";
+  const std::string nodes =
+      head + "\nnodes\nFiniteElementSpace\nFiniteElementCollection: H1_3D_P1\nVDim: 3\nOrdering: ";
   require_unit_tet(read_nodal_text("b.mesh", nodes + "1\n" + kUnitTet));
   require_unit_tet(read_nodal_text("b.mesh", nodes + "0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"));
   CHECK_THAT(nodal_refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
