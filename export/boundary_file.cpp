@@ -49,14 +49,19 @@ enum class NameArray {
   codes   ///< bytes: meshio stops at texts
 };
 
-/// Appends the codes of the characters of the names, each name ended by 0.
-void append_names(std::string& text, const std::vector<Group>& groups, NameArray kind) {
+/// Returns the codes of the characters of the names, each name ended by 0.
+std::vector<std::uint8_t> codes_of_names(const std::vector<Group>& groups) {
   std::vector<std::uint8_t> codes;
   for (const Group& group : groups) {
     const std::string name = label_of(group);
     codes.insert(codes.end(), name.begin(), name.end());
     codes.push_back(0);
   }
+  return codes;
+}
+
+void append_names(std::string& text, const std::vector<Group>& groups, NameArray kind) {
+  const std::vector<std::uint8_t> codes = codes_of_names(groups);
   if (kind == NameArray::codes)
     return append_data_array<std::uint8_t>(
         text, "Name=\"group_names\" NumberOfTuples=\"" + std::to_string(codes.size()) + '"', codes);
@@ -90,18 +95,9 @@ void append_vtk_groups(std::string& text, const std::vector<Group>& groups) {
   if (groups.empty()) return;
   text += "FIELD FieldData 2\ngroup_numbers 1 " + std::to_string(groups.size()) + " int\n";
   for (const Group& group : groups) text += std::to_string(group.number) + "\n";
-  text += "group_names 1 " + std::to_string(groups.size()) + " string\n";
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
-  for (const Group& group : groups) {  // VTK writes blanks and the like as %20
-    for (const char c : label_of(group)) {
-      const auto code = static_cast<unsigned char>(c);
-      if (code > ' ' && code < 127 && c != '%' && c != '"')
-        text += c;
-      else
-        (text += '%') += {kDigits[code / 16], kDigits[code % 16]};
-    }
-    text += '\n';
-  }
+  const std::vector<std::uint8_t> codes = codes_of_names(groups);  // as in .vtu
+  text += "group_names 1 " + std::to_string(codes.size()) + " unsigned_char\n";
+  for (const std::uint8_t code : codes) text += std::to_string(code) + "\n";
 }
 
 }  // namespace
@@ -177,8 +173,7 @@ std::string boundary_vtk_text(const PolygonMesh& boundary, const BoundaryOrigin&
     append_lines(text, origin.cells);
   }
   if (origin.vertices.empty()) return text;
-  text += "POINT_DATA " + std::to_string(boundary.positions.size()) +
-          "\nSCALARS vertex int 1\nLOOKUP_TABLE default\n";
+  text += "POINT_DATA " + std::to_string(boundary.positions.size()) + "\nSCALARS vertex int 1\nLOOKUP_TABLE default\n";
   append_lines(text, origin.vertices);
   return text;
 }

@@ -32,7 +32,7 @@ void append_group_fields(std::string& text, const FaceGroups& groups);
 /// InputError: no faces, indices out of range, coordinates that are not finite, lists of wrong length.
 std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin = {});
 
-/// Returns the same as legacy VTK 3.0 text; the names of groups stand in the field `group_names`.
+/// Returns the same as legacy VTK 3.0 text.
 std::string boundary_vtk_text(const PolygonMesh& boundary, const BoundaryOrigin& origin = {});
 
 /// Writes one of these, by the extension .vtu or .vtk; the whole file or nothing. InputError: also another extension.

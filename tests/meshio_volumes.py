@@ -43,7 +43,7 @@ def main():
         outputs = [word for name in FORMATS for word in ("-o", f"plate.{name}")]
         run(program, "fit", "plate.obj", "--cells", 500, *outputs, "--quiet")
         run(program, "convert", "plate.mesh", "--msh-version", "2.2", "-o", f"plate.{OLD_MSH}", "-o",
-            "boundary:faces.vtu", "--quiet")
+            "boundary:faces.vtu", "-o", "boundary:faces.vtk", "--quiet")
         wanted = hexes_of(Path(folder) / "plate.mesh")
         for name in (*FORMATS, OLD_MSH):
             module = NEEDED_MODULES.get(name)
@@ -58,15 +58,16 @@ def main():
                 agrees = False
                 print(f"plate.{name}: NOT READ: {error!r}")
             status |= not agrees
-        try:
-            faces = meshio.read(Path(folder) / "faces.vtu")
-            named = [numbers for block in faces.cell_data["group"] for numbers in block]
-            agrees = len(named) > 0 and min(named) >= 1
-            print(f"faces.vtu: {len(named)} faces, {'all of them in groups' if agrees else 'NOT IN GROUPS'}")
-        except (Exception, SystemExit) as error:
-            agrees = False
-            print(f"faces.vtu: NOT READ: {error!r}")
-        status |= not agrees
+        for name in ("faces.vtu", "faces.vtk"):
+            try:
+                faces = meshio.read(Path(folder) / name)
+                named = [number for block in faces.cell_data["group"] for number in np.ravel(block)]
+                agrees = len(named) > 0 and min(named) >= 1
+                print(f"{name}: {len(named)} faces, {'all of them in groups' if agrees else 'NOT IN GROUPS'}")
+            except (Exception, SystemExit) as error:
+                agrees = False
+                print(f"{name}: NOT READ: {error!r}")
+            status |= not agrees
     return status
 
 

@@ -78,7 +78,7 @@ TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimi
   CHECK(has(content_of(place / "fit.msh"), "2 2 \"north\"\n"));
   CHECK(has(content_of(place / "fit.usda"), "def GeomSubset \"north\""));
   CHECK(has(content_of(place / "fit.glb"), "\"north\""));
-  CHECK(has(content_of(place / "faces.vtk"), "group_names 1 2 string\nsouth\nnorth\n"));
+  CHECK(has(content_of(place / "faces.vtk"), "group_names 1 12 unsigned_char\n115\n"));
   const auto groups = place.json("fit.json")["groups"];
   REQUIRE(groups.size() == 2);
   CHECK(groups[1]["name"] == "north");
