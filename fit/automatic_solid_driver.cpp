@@ -2,7 +2,6 @@
 #include "subvol/fit/automatic_solid_driver.h"
 
 #include "subvol/base/sort_unique.h"
-#include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/signed_features.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/fits/level_samples.h"
@@ -228,6 +227,7 @@ void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
   layout_ = edge_layout(start_.grid, start_.fitted, edges_.mesh, edges_.features, routing);
   cage_.reset();
   mesh_ = layout_->tagged_mesh;
+  sizes_.clear();
   begin_mesh(start_.stages);
   level_layout_ = {layout_->group_of_face, layout_->caps, layout_->creases};
 }

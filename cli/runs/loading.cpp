@@ -2,7 +2,6 @@
 #include "cli/runs/loading.h"
 
 #include "cli/runs/exit_status.h"
-#include "cli/runs/interrupt.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/curved_file.h"
@@ -160,7 +159,7 @@ TriangleMesh surface_with_interfaces(const VolumeMesh& mesh) {
 FittedTarget fitted_target(const Target& target, const VolumeMesh& mesh) {
   const auto* surface = std::get_if<TriangleMesh>(&target);
   if (!surface) return {{}, target};
-  MatchedTarget matched = matched_target(*surface, mesh, interrupted);
+  MatchedTarget matched = matched_target(*surface, mesh);
   return {std::move(matched.regions), matched.outer ? Target(*std::move(matched.outer)) : target};
 }
 

@@ -14,7 +14,7 @@ namespace subvol::internal {
 
 namespace {
 
-/// near_target  the grid at its fitted positions.  h: mean length of the edges of its boundary.
+/// near_target  the grid at its fitted positions.  h: mean length of the edges of its boundary, if a curve is lost.
 EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, const TriangleMesh& target,
                      const SignedFeatures& features, FeatureRouting routing, double h) {
   EdgeLayout layout;
@@ -48,7 +48,7 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   VolumeMesh near_target = grid;
   near_target.positions.assign(fitted.begin(), fitted.end());
   const FeatureRouting routing = route_features(near_target, features, options);
-  const double h = RoutingGraph(near_target).edge_length();
+  const double h = routing.unfollowed.empty() ? 0 : RoutingGraph(near_target).edge_length();
   std::vector<Index> beside = strips_in_parts(routing, target, features, h);
   while (true) {
     EdgeLayout layout =

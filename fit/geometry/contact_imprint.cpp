@@ -5,8 +5,7 @@
 #include "subvol/base/sort_unique.h"
 #include "subvol/fit/geometry/box_pairs.h"
 #include "subvol/fit/geometry/contact_overlay.h"
-#include "subvol/fit/geometry/near_vertices.h"
-#include "subvol/surface/triangle_geometry.h"
+#include "subvol/fit/geometry/vertex_grid.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -18,8 +17,8 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -125,13 +124,24 @@ void ContactImprint::find_clusters() {
   for (auto& [first, cluster] : members) clusters_.push_back(std::move(cluster));
 }
 
-/// Makes vertices of clusters one that are near each other.
+/// Makes vertices of clusters one that are near each other: each becomes the nearest one of those before it that stay.
 void ContactImprint::join_near_vertices() {
   std::vector<Index> vertices;
   for (const std::vector<Index>& cluster : clusters_)
     for (const Index t : cluster) std::ranges::copy(mesh_.triangles[t], std::back_inserter(vertices));
   sort_unique(vertices);
-  const std::vector<Index> number = near_vertices(mesh_.positions, vertices, distance_);
+  std::vector<Index> number(mesh_.positions.size());
+  std::iota(number.begin(), number.end(), 0);
+  VertexGrid staying(box_, distance_);
+  for (const Index v : vertices) {
+    std::size_t tests = 1;
+    const Index nearest = staying.nearest(mesh_.positions[v], tests);
+    budget_.spend(tests);
+    if (nearest == kNoIndex)
+      staying.add(v, mesh_.positions[v]);
+    else
+      number[v] = nearest;
+  }
   for (auto& t : mesh_.triangles)
     for (Index& v : t) v = number[v];
 }

@@ -16,13 +16,15 @@ inline constexpr double kTouchingShare = 1e-5;
 /// faces that are cut into other triangles, get equal triangles there: one for each solid.
 ///
 /// Triangles lie on each other if they overlap, seen along the normal of the larger one, and are within
-/// `kTouchingShare` of its plane there. They form clusters, whose vertices become one, or lie on edges, if they are
-/// that near. The edges of a cluster are the constraints of a Delaunay triangulation in its plane, whose triangles
-/// replace those of the cluster; triangles beside it are cut where its vertices lie on their edges.
+/// `kTouchingShare` of its plane there. They form clusters. A vertex of a cluster that is so near to another one
+/// becomes the nearest one that stays, so that none moves farther, and one that is so near to an edge lies on it. The
+/// edges of a cluster are the constraints of a Delaunay triangulation in its plane, whose triangles replace those of
+/// the cluster; triangles beside it are cut where its vertices lie on their edges.
 ///
 /// surface    finite, with valid vertex numbers.
-/// cancelled  asked now and then, from the calling thread; if it returns true, nothing is returned. Empty: never.
-/// returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`. Nothing
+/// cancelled  asked now and then in all steps, from the calling thread; if it returns true, nothing is returned. Empty:
+/// never. returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`.
+/// Nothing
 ///            if no triangles lie on each other but those that have the same corners; if a cluster does not lie in one
 ///            plane, or two of its vertices are at one place of it; or if there are too many (3e8 tests of a point or a
 ///            box, 3e7 pairs of boxes that meet in a cluster). What crosses is not looked at: the result may cross as

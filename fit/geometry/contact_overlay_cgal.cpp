@@ -149,6 +149,7 @@ class ContactOverlay::Cluster {
   bool triangulate() {
     std::map<Index, Overlay::Vertex_handle> handles;
     for (const Index v : vertices_) {
+      overlay_.budget_.spend(1);
       const Vec3& p = mesh_.positions[v];
       const Overlay::Vertex_handle handle = handles[v] = triangulation_.insert(OverlayKernel::Point_2(p[x_], p[y_]));
       if (handle->info().value != kNoIndex) return false;
@@ -219,15 +220,10 @@ class ContactOverlay::Cluster {
     return static_cast<Index>(mesh_.positions.size() - 1);
   }
 
-  /// Returns the least vertex of a grid within the distance of a point; kNoIndex: none.
+  /// Returns the vertex of a grid nearest to a point within the distance; kNoIndex: none.
   Index vertex_near(const Vec3& point, const VertexGrid& grid) const {
-    Index nearest = kNoIndex;
     std::size_t tests = 0;
-    grid.for_each_near(point, [&](Index v) {
-      ++tests;
-      if ((mesh_.positions[v] - point).norm() <= overlay_.distance_ && (nearest == kNoIndex || v < nearest))
-        nearest = v;
-    });
+    const Index nearest = grid.nearest(point, tests);
     overlay_.budget_.spend(tests);
     return nearest;
   }
@@ -301,15 +297,15 @@ std::optional<std::vector<ContactPiece>> ContactOverlay::cut(std::span<const Ind
   if (cluster.is_empty()) return std::vector<ContactPiece>();
   if (!cluster.find_plane()) return std::nullopt;
   cluster.find_edges();
-  cluster.add_crossings();
   try {
+    cluster.add_crossings();
     if (!cluster.triangulate()) return std::nullopt;
+    for (const Index v : cluster.vertices()) clusters_of_[v].push_back(vertices_.size());
+    vertices_.emplace_back(cluster.vertices(), mesh_.positions, distance_);
+    return cluster.pieces();
   } catch (const CGAL::Failure_exception&) {  // an assertion inside CGAL
     return std::nullopt;
   }
-  for (const Index v : cluster.vertices()) clusters_of_[v].push_back(vertices_.size());
-  vertices_.emplace_back(cluster.vertices(), mesh_.positions, distance_);
-  return cluster.pieces();
 }
 
 const std::vector<Index>& ContactOverlay::inside(Index a, Index b) {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
+#include <utility>
 
 namespace subvol::internal {
 
@@ -16,11 +16,20 @@ VertexGrid::VertexGrid(const Eigen::AlignedBox3d& box, double distance) : distan
 bool VertexGrid::is_usable() const { return std::isfinite(cell_) && cell_ > 0; }
 
 void VertexGrid::add(Index v, const Vec3& position) {
-  if (static_cast<std::size_t>(v) >= next_.size()) next_.resize(v + 1, kNoIndex);
-  const auto [found, is_new] = first_.try_emplace(key(cell_of(position)), v);
-  if (is_new) return;
-  next_[v] = found->second;
-  found->second = v;
+  const auto at = static_cast<Index>(entries_.size());
+  const auto [last, is_new] = last_.try_emplace(key(cell_of(position)), at);
+  entries_.push_back({v, is_new ? kNoIndex : last->second, position});
+  last->second = at;
+}
+
+Index VertexGrid::nearest(const Vec3& point, std::size_t& num_tests) const {
+  std::pair<double, Index> nearest{distance_, kNoIndex};
+  for_each_near(point, [&](Index v, const Vec3& position) {
+    ++num_tests;
+    const std::pair<double, Index> found{(position - point).norm(), v};
+    if (found.first <= distance_ && (nearest.second == kNoIndex || found < nearest)) nearest = found;
+  });
+  return nearest.second;
 }
 
 VertexGrid::Cell VertexGrid::cell_of(const Vec3& point) const {

@@ -6,13 +6,14 @@
 #include <Eigen/Geometry>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <unordered_map>
 #include <vector>
 
 namespace subvol::internal {
 
-/// Vertices in the cells of a grid, for finding those near a point.
+/// Vertices in the cells of a grid, for finding those near a point. Its memory is that of the vertices it holds.
 class VertexGrid {
  public:
   /// box       of the vertices.
@@ -21,10 +22,14 @@ class VertexGrid {
 
   /// False if the vertices lie too far apart for numbers, or all in one place: the grid then has no cells.
   bool is_usable() const;
-  /// Adds a vertex, which is not there yet.
   void add(Index v, const Vec3& position);
 
-  /// Calls visit(vertex) for all vertices in cells that a ball of the distance's radius meets, and maybe some others.
+  /// Returns the vertex nearest to a point, of equally near ones the least, within the distance; kNoIndex: none.
+  /// num_tests  grows by the number of vertices that were looked at.
+  Index nearest(const Vec3& point, std::size_t& num_tests) const;
+
+  /// Calls visit(vertex, position) for all vertices in cells that a ball of the distance's radius meets, and maybe some
+  /// others.
   template <class Visit>
   void for_each_near(const Vec3& point, const Visit& visit) const {
     const Vec3 reach = Vec3::Constant(distance_);
@@ -32,9 +37,10 @@ class VertexGrid {
     for (std::int64_t i = low[0]; i <= high[0]; ++i)
       for (std::int64_t j = low[1]; j <= high[1]; ++j)
         for (std::int64_t k = low[2]; k <= high[2]; ++k) {
-          const auto found = first_.find(key({i, j, k}));
-          if (found == first_.end()) continue;
-          for (Index v = found->second; v != kNoIndex; v = next_[v]) visit(v);
+          const auto found = last_.find(key({i, j, k}));
+          if (found == last_.end()) continue;
+          for (Index at = found->second; at != kNoIndex; at = entries_[at].before)
+            visit(entries_[at].vertex, entries_[at].position);
         }
   }
 
@@ -46,8 +52,13 @@ class VertexGrid {
 
   double distance_, cell_;
   Vec3 low_;
-  std::unordered_map<std::uint64_t, Index> first_;  ///< vertex of each cell that was added last
-  std::vector<Index> next_;                         ///< the one that was added before, for each vertex
+  struct Entry {
+    Index vertex;
+    Index before;  ///< place of the entry of the same cell that was added before
+    Vec3 position;
+  };
+  std::vector<Entry> entries_;
+  std::unordered_map<std::uint64_t, Index> last_;  ///< place of the entry of each cell that was added last
 };
 
 }  // namespace subvol::internal

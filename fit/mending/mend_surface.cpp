@@ -3,9 +3,9 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
-#include "subvol/fit/geometry/near_vertices.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mending/local_mending.h"
+#include "subvol/fit/mending/near_vertices.h"
 #include "subvol/fit/mending/surface_faults.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/by_number.h"

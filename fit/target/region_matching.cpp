@@ -106,7 +106,10 @@ MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& templ
     matched.outer = outer_surface(*matched.regions);
     return matched;
   }
+  const auto is_cancelled = [&] { return cancelled && cancelled(); };
+  if (is_cancelled()) return {};
   std::optional<TouchingSolids> solids = touching_solids(target, cancelled);
+  if (is_cancelled()) return {};
   const std::optional<RegionSurface> others = solids ? std::optional(std::move(solids->regions)) : find_regions(target);
   if (!others || has_cavity(template_mesh)) return matched;
   matched.outer = outer_surface(*others);

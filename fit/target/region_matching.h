@@ -38,7 +38,7 @@ struct MatchedTarget {
 /// inward. The walls of cavities may look like regions, depending on their orientation; they stay.
 /// A template with a vertex number out of range gets nothing.
 ///
-/// cancelled  as for `regions_as_in`.
+/// cancelled  as for `regions_as_in`; if it returns true, nothing is known, and there is no warning.
 /// InputError: as `regions_as_in`. Cost: as `find_regions`, and `regions_as_in` if the template has regions.
 MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh,
                              const std::function<bool()>& cancelled = {});

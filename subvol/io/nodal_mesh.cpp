@@ -84,9 +84,9 @@ const std::vector<int>& NodalCells::places(CellKind kind, int order, NodeOrderin
 }
 
 void NodalCells::add(CellKind kind, int order, NodeOrdering ordering, std::span<const Index> nodes) {
-  assert(is_size(kind, order, nodes.size()) ||
-         (order == 2 && ordering == NodeOrdering::vtk &&
-          nodes.size() == (kind == CellKind::hex ? kHexWithSides : kStraightPrism)));
+  assert(is_size(kind, order, nodes.size()) || (order == 2 && ordering == NodeOrdering::vtk &&
+                                                ((kind == CellKind::hex && nodes.size() == kHexWithSides) ||
+                                                 (kind == CellKind::prism && nodes.size() == kStraightPrism))));
   std::vector<Index> cell;
   for (const int place : places(kind, order, ordering))
     if (static_cast<std::size_t>(place) < nodes.size()) cell.push_back(nodes[static_cast<std::size_t>(place)]);
@@ -123,7 +123,7 @@ Index NodalCells::shared_center(std::span<const Index> corners, std::span<const 
 void NodalCells::complete(CellKind kind, std::vector<Index>& nodes) {
   const std::vector<LatticePoint> lattice = cell_lattice(kind, 2, NodeOrdering::vtk);
   const auto corners = static_cast<std::size_t>(cell_topology(kind).num_vertices);
-  if (nodes.size() == kStraightPrism)
+  if (kind == CellKind::prism && nodes.size() == kStraightPrism)
     for (const Index v : {0, 1, 2})
       nodes.push_back(shared_center(std::array{nodes[v], nodes[v + 3]}, std::span<const Index>(), 0.5, 0));
   const std::size_t given = nodes.size();

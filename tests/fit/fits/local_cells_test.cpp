@@ -6,6 +6,10 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <span>
+#include <vector>
+
 using namespace subvol;
 using namespace subvol::internal;
 

@@ -2,8 +2,8 @@
 #include "subvol/fit/mending/mend_surface.h"
 
 #include "subvol/base/error.h"
-#include "subvol/fit/geometry/near_vertices.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mending/near_vertices.h"
 #include "subvol/fit/mending/surface_faults.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/shell/shell.h"

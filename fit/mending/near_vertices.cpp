@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/geometry/near_vertices.h"
+#include "subvol/fit/mending/near_vertices.h"
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/sort_unique.h"
@@ -129,9 +129,9 @@ bool CrackSets::find_pairs() {
   std::vector<NearPair> near;
   for (const Index v : vertices) {
     near.clear();
-    before.for_each_near(positions_[v], [&](Index w) {
+    before.for_each_near(positions_[v], [&](Index w, const Vec3& position) {
       ++cost;
-      const double apart = (positions_[w] - positions_[v]).norm();
+      const double apart = (position - positions_[v]).norm();
       if (apart <= distance_) near.push_back({apart, w, v});
     });
     before.add(v, positions_[v]);
@@ -175,17 +175,12 @@ std::vector<Index> near_vertices(std::span<const Vec3> positions, std::span<cons
   if (!staying.is_usable()) return number;
   std::size_t cost = 0;
   for (const Index v : vertices) {
-    std::pair<double, Index> nearest{distance, kNoIndex};
-    staying.for_each_near(positions[v], [&](Index w) {
-      ++cost;
-      const std::pair<double, Index> found{(positions[w] - positions[v]).norm(), w};
-      if (found.first <= distance && (nearest.second == kNoIndex || found < nearest)) nearest = found;
-    });
+    const Index nearest = staying.nearest(positions[v], cost);
     if (cost > kMostComparisons) break;
-    if (nearest.second == kNoIndex)
+    if (nearest == kNoIndex)
       staying.add(v, positions[v]);
     else
-      number[v] = nearest.second;
+      number[v] = nearest;
   }
   return number;
 }
