@@ -208,7 +208,7 @@ class ExodusParser {
     const std::size_t n = count_of("num_nodes");
     if (!file_.dimension("num_nodes") || !file_.dimension("num_dim")) file_.fail("no Exodus file: expected num_nodes");
     if (count_of("num_dim") != 3)
-      file_.fail("a mesh of " + std::to_string(count_of("num_dim")) + " dimensions: expected three, as of a solid");
+      file_.fail("a mesh whose dimension is " + std::to_string(count_of("num_dim")) + ": expected 3, as of a solid");
     std::vector<double> x, y, z;
     if (file_.has("coord")) {
       const std::vector<double> all = file_.reals("coord", file_.size_of("coord", 3, n));
