@@ -92,8 +92,9 @@ class AutomaticFit : AutomaticSolidDriver {
   void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
   /// Nor are larger meshes, if the number of cells is free: it takes minutes and gains little.
-  /// Nor are meshes that follow edges: of 25 parts and models, whose fits took twice as long with a refinement, it
-  /// improved four by little and none from a failure to a success. Cells between small and large ones are too poor.
+  /// Nor are meshes that follow edges: with a free number of cells, the fits of 25 parts and models took up to twice as
+  /// long with a refinement. It brought the best trial of four, whose merit was a little lower, and none became good by
+  /// it. Cells between small and large ones are too poor.
   bool is_worth_refining() const {
     const bool has_room = options_.cells || static_cast<double>(best().cells) <= most_refined_cells();
     return !options_.makes_cage && !is_good() && has_room && best_start_.kind == AutomaticAttempt::Kind::smooth;
