@@ -22,9 +22,9 @@ inline constexpr double kTouchingShare = 1e-5;
 /// the cluster; triangles beside it are cut where its vertices lie on their edges.
 ///
 /// surface    finite, with valid vertex numbers.
-/// cancelled  asked now and then in all steps, from the calling thread; if it returns true, nothing is returned. Empty:
-/// never. returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`.
-/// Nothing
+/// cancelled  asked now and then in all steps, from the calling thread; if it returns true, nothing is returned.
+///            Empty: never.
+/// returns    the welded surface with its groups, whose shape is that of the given one within `kTouchingShare`. Nothing
 ///            if no triangles lie on each other but those that have the same corners; if a cluster does not lie in one
 ///            plane, or two of its vertices are at one place of it; or if there are too many (3e8 tests of a point or a
 ///            box, 3e7 pairs of boxes that meet in a cluster). What crosses is not looked at: the result may cross as

@@ -65,7 +65,7 @@ class ContactOverlay {
 
   /// Cuts one cluster of triangles, given by their numbers. Returns the pieces, each for the triangle that it is a part
   /// of; nothing if the triangles do not lie in one plane, or two of their vertices are at one place of it.
-  /// ContactBudget::Spent: as its name says.
+  /// ContactBudget::Spent: there are too many tests, or the work is cancelled.
   std::optional<std::vector<ContactPiece>> cut(std::span<const Index> cluster);
 
   /// Returns the vertices inside an edge, from its lower number on, of the clusters that both ends are in.
