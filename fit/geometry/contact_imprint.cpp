@@ -73,7 +73,8 @@ class ContactImprint {
     distance_ = box_.isEmpty() ? 0 : kTouchingShare * box_.diagonal().norm();
   }
 
-  /// Returns false if there are no clusters, or some cannot be cut. ContactBudget::Spent: there are too many tests, or the work is cancelled.
+  /// Returns false if there are no clusters, or some cannot be cut. ContactBudget::Spent: there are too many tests, or
+  /// the work is cancelled.
   bool run() {
     find_clusters();
     if (clusters_.empty()) return false;
