@@ -90,6 +90,9 @@ struct AutomaticFitTrial {
   int level = 0;                                ///< times the template was subdivided
   double mean_percent = 0, max_percent = 0;     ///< distance, percent of the target's diagonal
   std::optional<FeatureMiss> feature_miss;      ///< in the target's unit; empty: there are no small features
+  /// The feature, of those with a radius of at least `kLostFeaturePercent`, that is missed by the largest share of its
+  /// radius, if by more than all of it; empty: no such feature is lost.
+  std::optional<FeatureMiss> lost_feature;
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
   double least_share = 0;  ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t uncertified = 0;

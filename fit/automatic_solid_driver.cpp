@@ -134,14 +134,19 @@ bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule,
   return going;
 }
 
-std::optional<FeatureMiss> AutomaticSolidDriver::feature_miss(const ClosestPoint& surface) const {
-  std::optional<FeatureMiss> miss = largest_feature_miss(features_, surface);
-  if (!miss) return miss;
-  miss->place = target_.normalization.from_unit({miss->place})[0];
-  miss->size_percent = 100 * miss->size;
-  miss->distance *= target_.normalization.diagonal;
-  miss->size *= target_.normalization.diagonal;
-  return miss;
+void AutomaticSolidDriver::measure_features(const ClosestPoint& surface, AutomaticFitTrial& trial) const {
+  const std::vector<double> distances = feature_distances(features_, surface);
+  const auto largest_miss = [&](double least_size) {
+    std::optional<FeatureMiss> miss = largest_feature_miss(features_, distances, least_size);
+    if (!miss) return miss;
+    miss->place = target_.normalization.from_unit({miss->place})[0];
+    miss->distance *= target_.normalization.diagonal;
+    miss->size *= target_.normalization.diagonal;
+    return miss;
+  };
+  trial.feature_miss = largest_miss(0);
+  trial.lost_feature = largest_miss(kLostFeaturePercent / 100);
+  if (trial.lost_feature && trial.lost_feature->share <= 1) trial.lost_feature.reset();
 }
 
 std::optional<CreaseDistance> AutomaticSolidDriver::distance_of_edges() const {
@@ -189,7 +194,7 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
     const TriangleMesh limit = cage_->limit_surface();
     measure(limit, ClosestPoint(limit));
   }
-  trial.feature_miss = feature_miss(surface_tree);
+  measure_features(surface_tree, trial);
   trial.solid_volume_percent = volume_difference_percent(surface, target_.surface);
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();

@@ -71,7 +71,7 @@ class AutomaticSolidDriver : protected AutomaticDriver {
 
  private:
   /// Returns the largest miss of the target's small features by a surface, in the target's unit and coordinates.
-  std::optional<FeatureMiss> feature_miss(const ClosestPoint& surface) const;
+  void measure_features(const ClosestPoint& surface, AutomaticFitTrial& trial) const;
   /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
   std::optional<CreaseDistance> distance_of_edges() const;
   /// Returns the curves that the present mesh does not follow: all of them if it follows none.

@@ -25,12 +25,6 @@ constexpr double kNotValid = 10;
 /// 0.3 of the quality aimed at. (At 0.6, parts ended with status 4 for 0.03 of the scaled Jacobian.)
 constexpr double kFarOff = 1.5;
 
-/// Returns true if a feature that is no noise is missed by more than its radius.
-bool loses_feature(const AutomaticFitTrial& trial) {
-  const std::optional<FeatureMiss>& miss = trial.feature_miss;
-  return miss && miss->share > 1 && miss->size_percent > kLostFeaturePercent;
-}
-
 }  // namespace
 
 AutomaticFitOptions checked_options(AutomaticFitOptions options) {
@@ -57,7 +51,7 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
   const bool is_far_off =
-      trial.long_edges_lost > 0 || loses_feature(trial) || trial.solid_volume_percent > kFarOffSolidVolumePercent;
+      trial.long_edges_lost > 0 || trial.lost_feature || trial.solid_volume_percent > kFarOffSolidVolumePercent;
   return excess(trial.max_percent, options.max_tolerance_percent) +
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
@@ -165,9 +159,9 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   if (num_long > 0)
     reasons.push_back(formatted("%s longer than %.3g %% of the diagonal that are not followed: %td", name,
                                 kLongEdgePercent, num_long));
-  if (loses_feature(chosen))
-    reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", chosen.feature_miss->size,
-                                chosen.feature_miss->distance));
+  if (chosen.lost_feature)
+    reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", chosen.lost_feature->size,
+                                chosen.lost_feature->distance));
   const double most_volume = kFarOffVolumeFactor * kAutomaticVolumePercent;
   if (chosen.volume_percent > most_volume)
     reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", most_volume));

@@ -35,6 +35,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"max_percent", trial.max_percent},
                       {"volume_percent", std::max(trial.volume_percent, trial.solid_volume_percent)},
                       {"feature_miss", feature_miss_json(trial.feature_miss)},
+                      {"lost_feature", feature_miss_json(trial.lost_feature)},
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
                       {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
                       {"self_intersections", trial.self_intersections ? Json(*trial.self_intersections) : Json()},

@@ -57,14 +57,22 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
   return features;
 }
 
-std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, const ClosestPoint& fitted) {
-  if (features.points.empty()) return std::nullopt;
+std::vector<double> feature_distances(const FeatureSizes& features, const ClosestPoint& fitted) {
   std::vector<ClosestPoint::Hit> hits(features.points.size());
   fitted.closest(features.points, hits);
-  FeatureMiss largest{-1};
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    const double share = hits[i].distance / features.sizes[i];
-    if (share > largest.share) largest = {share, hits[i].distance, features.sizes[i], features.points[i]};
+  std::vector<double> distances;
+  distances.reserve(hits.size());
+  for (const ClosestPoint::Hit& hit : hits) distances.push_back(hit.distance);
+  return distances;
+}
+
+std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, std::span<const double> distances,
+                                                double least_size) {
+  std::optional<FeatureMiss> largest;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const double size = features.sizes[i], share = distances[i] / size;
+    if (size >= least_size && (!largest || share > largest->share))
+      largest = {share, distances[i], size, features.points[i]};
   }
   return largest;
 }

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace subvol {
@@ -43,12 +44,15 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
 struct FeatureMiss {
   double share = 0;  ///< distance / size
   double distance = 0, size = 0;
-  Vec3 place{0, 0, 0};      ///< a point of the feature
-  double size_percent = 0;  ///< of the target's diagonal; `largest_feature_miss` leaves it to its caller
+  Vec3 place{0, 0, 0};  ///< a point of the feature
 };
 
-/// Returns the largest distance from the points of features to a fitted surface, as a share of their sizes; nothing if
-/// there are no features. InputError: as `ClosestPoint::closest`.
-std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, const ClosestPoint& fitted);
+/// Returns the distance from each point of features to a fitted surface. InputError: as `ClosestPoint::closest`.
+std::vector<double> feature_distances(const FeatureSizes& features, const ClosestPoint& fitted);
+
+/// Returns the largest of these distances as a share of the size there, among the points of features of at least a
+/// given size; nothing if there are none.
+std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, std::span<const double> distances,
+                                                double least_size = 0);
 
 }  // namespace subvol

@@ -54,12 +54,22 @@ TEST_CASE("features: a cube has none, however sharp its edges are") {
 
 TEST_CASE("features: the largest miss is a share of the size") {
   const FeatureSizes sizes = sizes_of(plate(0.1), 0.5);
-  const auto miss = largest_feature_miss(sizes, ClosestPoint(plate(0.12)));
+  const auto miss = largest_feature_miss(sizes, feature_distances(sizes, ClosestPoint(plate(0.12))));
   REQUIRE(miss);
   CHECK(miss->distance == Approx(0.01));
   CHECK(miss->share == Approx(0.01 / miss->size));
-  CHECK(largest_feature_miss(sizes, ClosestPoint(plate(0.1)))->share == Approx(0).margin(1e-12));
-  CHECK(!largest_feature_miss({}, ClosestPoint(plate(0.1))));
+  const ClosestPoint same(plate(0.1));
+  CHECK(largest_feature_miss(sizes, feature_distances(sizes, same))->share == Approx(0).margin(1e-12));
+  CHECK(!largest_feature_miss({}, feature_distances({}, same)));
+}
+
+TEST_CASE("features: a small one that is missed more does not hide a large one") {
+  const FeatureSizes sizes{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0.1, 1, 2}};
+  const std::vector<double> distances{0.5, 1.5, 2.5};
+  CHECK(largest_feature_miss(sizes, distances)->size == 0.1);
+  CHECK(largest_feature_miss(sizes, distances, 1)->size == 1);
+  CHECK(largest_feature_miss(sizes, distances, 1.1)->size == 2);
+  CHECK(!largest_feature_miss(sizes, distances, 2.1));
 }
 
 TEST_CASE("features: a radius that is not positive is refused") {
