@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/subdivision_driver.h"
 
+#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/certificate/certificate.h"
@@ -39,6 +40,8 @@ void check_options(const FitOptions& options) {
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
+  if (options.frees_mesh && (options.cage_only || options.keep_states))
+    throw InputError("FitOptions: frees_mesh does not go with cage_only or keep_states, which need the cage");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/energies/make_surface_term.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/freed_mesh.h"
 #include "subvol/fit/subdivision_driver.h"
 #include "subvol/fit/target/region_matching.h"
 
@@ -13,6 +14,7 @@
 #include <functional>
 #include <new>
 #include <optional>
+#include <span>
 #include <utility>
 
 namespace subvol {
@@ -27,6 +29,9 @@ class SubdivisionFit : SubdivisionDriver {
   SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
       : SubdivisionDriver(std::move(target), template_mesh, options) {}
   FitResult run();
+  /// Returns the finest mesh with lifted cells, if the surface suffered too much for the cage: its vertices, once free,
+  /// find back. Without cells if there is none.
+  VolumeMesh take_lifted_mesh() { return std::move(lifted_mesh_); }
 
  private:
   bool run_levels();
@@ -36,6 +41,8 @@ class SubdivisionFit : SubdivisionDriver {
   bool lower_lambda(std::size_t pairs);
   bool raise_quality();
   bool flatten_interfaces();
+
+  VolumeMesh lifted_mesh_;
 };
 
 /// Repeats the finest level with less and less weight on the cells' shape, until the wanted accuracy is reached.
@@ -115,7 +122,8 @@ bool SubdivisionFit::raise_quality() {
   double best_jacobian = before->least_jacobian;
   const bool is_poor = before->least_jacobian < kPoorShare * options_.quality;
   bool is_lifted = false;
-  for (const QualityAttempt& attempt : kQualityAttempts) {
+  const auto attempts = std::span(kQualityAttempts).first(options_.frees_mesh ? 1 : kQualityAttempts.size());
+  for (const QualityAttempt& attempt : attempts) {
     const bool has_gained = best_jacobian > before->least_jacobian;
     const bool is_lift = attempt.kind == QualityAttempt::Kind::lift;
     if (has_gained && (is_lift || best_jacobian >= kEnoughOfGoal * options_.quality)) break;
@@ -136,6 +144,10 @@ bool SubdivisionFit::raise_quality() {
       return false;
     }
     is_lifted = now->least_jacobian > before->least_jacobian;
+    if (is_lifted && options_.frees_mesh) {
+      lifted_mesh_ = current_mesh();
+      lifted_mesh_.positions = target_.normalization.from_unit(std::move(lifted_mesh_.positions));
+    }
     if (!now->gains_on(*before, options_.tolerance_percent)) continue;
     if (now->least_jacobian <= best_jacobian) break;  // more weight of the surface would not help
     best_jacobian = now->least_jacobian;
@@ -256,9 +268,18 @@ FitResult SubdivisionFit::run() {
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {
   const MatchedTarget matched = matched_target(target, template_mesh, options.control.cancelled);
-  if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, options).run();
-  auto result = SubdivisionFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
+  FitOptions used = options;
+  used.frees_mesh = options.frees_mesh && can_be_freed(template_mesh, options);
+  if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, used).run();
+  const TriangleMesh& surface = matched.outer ? *matched.outer : target;
+  if (used.frees_mesh) used.control = part_of_work(options.control, 0, 1 - kShareOfFreeing);
+  SubdivisionFit fit(FitTarget(surface), template_mesh, used);
+  FitResult result = fit.run();
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
+  if (used.frees_mesh) {
+    used.control = options.control;
+    free_mesh(surface, used, fit.take_lifted_mesh(), result);
+  }
   return result;
 }
 
@@ -266,7 +287,9 @@ FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& tem
   if (options.crease_angle_degrees)
     throw InputError("FitOptions::crease_angle_degrees: points have no edges to be kept sharp");
   require_closest(options.correspondence);
-  return SubdivisionFit(FitTarget(target, options.point_weights), template_mesh, options).run();
+  FitOptions used = options;
+  used.frees_mesh = false;
+  return SubdivisionFit(FitTarget(target, options.point_weights), template_mesh, used).run();
 }
 
 }  // namespace subvol

@@ -43,6 +43,9 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("surface", options.surface, {{"limit", FittedSurface::limit}, {"mesh", FittedSurface::mesh}});
   keywords.take("boundary", options.boundary, boundary_rules());
   keywords.take("cage_only", options.cage_only);
+  bool keeps_cage = true;
+  keywords.take("keep_cage", keeps_cage);
+  options.frees_mesh = !keeps_cage;
   keywords.take("lambda_far", options.lambda_far);
   keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
@@ -83,7 +86,8 @@ class Fit {
     else
       keywords_.take("cells", template_options_.cells);
     if (curved_) {
-      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "lambda_far"}, "does not go with order");
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "keep_cage", "lambda_far"},
+                       "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
       take_edges(high_order_);
@@ -152,17 +156,19 @@ class Fit {
     const MeshCheck found = work_.run("check", [&] {
       return std::visit([&](const auto& target) { return check_mesh(fit.mesh, &target); }, target_);
     });
-    const cli::MeasuredLimit limit = measured_limit(fit.cage, target_, writing_, work_);
+    const bool has_cage = fit.cage.num_cells() > 0;
+    cli::MeasuredLimit limit;
+    if (has_cage) limit = measured_limit(fit.cage, target_, writing_, work_);
     const cli::GroupsFound groups = work_.run("groups", [&] {
-      cli::carry_groups(target_, fit.cage);
+      if (has_cage) cli::carry_groups(target_, fit.cage);
       return cli::carry_groups(target_, fit.mesh);
     });
     Json json = report_of(fit.report, found, groups);
-    json.update(cli::cage_json(fit.cage, limit, found.target_diagonal));
+    if (has_cage) json.update(cli::cage_json(fit.cage, limit, found.target_diagonal));
     json["audit"] = cli::audit_json(audit(*template_));
     finish(result, json, fit.report);
     result.states = std::move(fit.states);
-    result.cage = std::make_shared<VolumeMesh>(std::move(fit.cage));
+    if (has_cage) result.cage = std::make_shared<VolumeMesh>(std::move(fit.cage));
     result.mesh = std::make_shared<VolumeMesh>(std::move(fit.mesh));
   }
 
@@ -220,8 +226,8 @@ class Fit {
 
 constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
-    boundary='catmull-clark', cage_only=False, crease_angle=None, keep_groups=False, lambda_far=1.0, quality=0.65,
-    lambda_close=None, correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
+    boundary='catmull-clark', cage_only=False, keep_cage=True, crease_angle=None, keep_groups=False, lambda_far=1.0,
+    quality=0.65, lambda_close=None, correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
     time_limit=0.0, order=None, basis='legendre', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
     resume=None, chord=0.005, progress=None, threads=None)
 --
@@ -236,6 +242,8 @@ levels        times the template is subdivided, 1 .. 6
 surface       what is to agree with the target: the cage's 'limit' surface, or the finest 'mesh'
 boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
+keep_cage     False: if the cage keeps cells below the quality, the points of the finest mesh are freed from it, and
+              the result has no cage
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
 
 With order, 1 .. 16, curved cells:

@@ -110,13 +110,7 @@ void AutomaticFitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = used(options_of_result(verb_));
-  if (has_cage()) return write_cage(result_.cage, result_.mesh, result_.states, writing);
-  write_each([&](const Output& output) {
-    if (output.part == Part::animation)
-      write_animation(output, result_.mesh, result_.mesh, result_.states, writing);
-    else
-      write_output(output, result_.mesh, writing);
-  });
+  write_results(result_.cage, result_.mesh, result_.states, writing);
 }
 
 void AutomaticFitRun::check() {

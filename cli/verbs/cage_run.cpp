@@ -7,6 +7,17 @@
 
 namespace subvol::cli {
 
+void CageRun::write_results(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
+                            const WritingOptions& writing) {
+  if (cage.num_cells() > 0) return write_cage(cage, mesh, states, writing);
+  write_each([&](const Output& output) {
+    if (output.part == Part::animation)
+      write_animation(output, mesh, mesh, states, writing);
+    else
+      write_output(output, mesh, writing);
+  });
+}
+
 void CageRun::write_cage(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
                          const WritingOptions& writing) {
   const auto write = [&](bool with_limit) {

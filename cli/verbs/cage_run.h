@@ -12,18 +12,23 @@
 
 namespace subvol::cli {
 
-/// The common base of runs whose result is a cage and the mesh that it is subdivided to.
+/// The common base of runs whose result is a mesh, or a cage and the mesh that it is subdivided to.
 class CageRun : public LongRun {
  protected:
   using LongRun::LongRun;
 
-  /// Writes all outputs. states: of the cage, for animations.
-  void write_cage(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
-                  const WritingOptions& writing);
+  /// Writes all outputs. cage: without cells if there is none. states: of the cage, or of the mesh if there is none, for
+  /// animations.
+  void write_results(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
+                     const WritingOptions& writing);
   /// Measures the distance between the limit surface of the cage and a target.
   void measure_limit(const VolumeMesh& cage, const Target& target, const WritingOptions& writing);
 
   MeasuredLimit limit_;
+
+ private:
+  void write_cage(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
+                  const WritingOptions& writing);
 };
 
 }  // namespace subvol::cli

@@ -222,11 +222,12 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
 }
 
 /// Arguments of the same run with a subdivision volume.
-SubdivisionFitArguments subdivision_arguments(const FitArguments& arguments) {
+SubdivisionFitArguments subdivision_arguments(const FitArguments& arguments, const CLI::App& verb) {
   SubdivisionFitArguments result{arguments.run,           arguments.writing, arguments.fit,          arguments.target,
                                  arguments.template_mesh, arguments.cells,   arguments.quality_floor};
   result.template_fit = template_options(arguments);
   FitOptions& fit = result.fit;
+  fit.frees_mesh = !fit.cage_only && verb.count("--surface") == 0;
   fit.surface = arguments.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
   fit.boundary = arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
   fit.solver = solver_kind(arguments);
@@ -248,7 +249,7 @@ int run_fit(const FitArguments& given, const CLI::App& verb) {
   arguments.fit.quality = given.quality;
   arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : arguments.fit.levels);
   return given.order > 0 ? run_high_order_fit(high_order_arguments(arguments, verb), verb)
-                         : run_subdivision_fit(subdivision_arguments(arguments), verb);
+                         : run_subdivision_fit(subdivision_arguments(arguments, verb), verb);
 }
 
 void add_solver_options(CLI::App& verb, FitArguments& arguments) {

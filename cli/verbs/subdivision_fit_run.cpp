@@ -21,11 +21,21 @@
 #include <algorithm>
 #include <iostream>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace subvol::cli {
 namespace {
+
+/// Returns true if cells are asked for, and nothing that needs the cage.
+bool asks_for_cells_alone(std::span<const Output> outputs) {
+  return std::ranges::any_of(outputs, [](const Output& output) { return output.is_volume(); }) &&
+         std::ranges::none_of(
+             outputs, [](const Output& output) { return output.part == Part::cage || output.part == Part::animation; });
+}
 
 /// One run of `fit` that makes a subdivision volume, from its input files to its output files.
 class SubdivisionFitRun : public CageRun {
@@ -42,6 +52,12 @@ class SubdivisionFitRun : public CageRun {
   void check();
   Json report() const;
   void summarize() const;
+  bool has_cage() const { return result_.cage.num_cells() > 0; }
+  bool frees_mesh() const { return arguments_.fit.frees_mesh && asks_for_cells_alone(outputs_); }
+  /// Returns what a resumed run must have in common with this one, but for its options and its template.
+  std::vector<std::pair<std::string, std::string>> identity_of_target() const {
+    return {{"target", fingerprint(target_)}, {"result", frees_mesh() ? "mesh" : "cage"}};
+  }
 
   const SubdivisionFitArguments& arguments_;
   Target target_;
@@ -67,7 +83,7 @@ void SubdivisionFitRun::load() {
   if (arguments_.template_mesh.path.empty()) {
     repair_to_fill(target_, arguments_.template_fit.regions, warnings_);
     // Checked before minutes are spent on making one.
-    require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
+    require_resumable(run_, run_identity(verb_, identity_of_target()));
   }
   tell_warnings();
 }
@@ -93,10 +109,12 @@ void SubdivisionFitRun::load_template() {
 
 void SubdivisionFitRun::fit() {
   FitOptions options = arguments_.fit;
-  checkpointing_.emplace(
-      run_, run_identity(verb_, {{"target", fingerprint(target_)}, {"template", fingerprint(template_mesh_)}}));
-  options.control.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
+  options.frees_mesh = frees_mesh();
+  std::vector<std::pair<std::string, std::string>> inputs = identity_of_target();
+  inputs.emplace_back("template", fingerprint(template_mesh_));
+  checkpointing_.emplace(run_, run_identity(verb_, inputs));
+  options.control.log = checkpointing_->log();
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // Making the template may have used part of the time limit.
   if (options.control.time_limit_seconds > 0)
@@ -114,7 +132,7 @@ void SubdivisionFitRun::fit() {
         result_.mesh.num_cells(), *arguments_.cells, template_mesh_.num_cells(), options.levels));
   add_warnings(result_.report.warnings);
   groups_ = carry_groups(outer_, result_.mesh);
-  carry_groups(outer_, result_.cage);
+  if (has_cage()) carry_groups(outer_, result_.cage);
   add_warnings(groups_.warnings);
   add_warnings_of_names(marks_of(result_.mesh));
 }
@@ -123,7 +141,7 @@ void SubdivisionFitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
-  write_cage(result_.cage, result_.mesh, result_.states, writing);
+  write_results(result_.cage, result_.mesh, result_.states, writing);
 }
 
 void SubdivisionFitRun::check() {
@@ -134,12 +152,12 @@ void SubdivisionFitRun::check() {
         mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
       },
       outer_);
-  measure_limit(result_.cage, outer_, arguments_.writing);
+  if (has_cage()) measure_limit(result_.cage, outer_, arguments_.writing);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   add_warnings(warnings_of_quality(arguments_.fit.quality, mesh_check_));
   add_warnings(warnings_of_volumes(mesh_check_, regions_));
-  if (arguments_.fit.surface == FittedSurface::limit)
+  if (has_cage() && arguments_.fit.surface == FittedSurface::limit)
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
             limit_.mean_percent(mesh_check_.target_diagonal), result_.report);
 }
@@ -158,7 +176,7 @@ Json SubdivisionFitRun::report() const {
   if (mesh_check_.regions) json["regions"] = regions_json(*mesh_check_.regions, regions_, template_mesh_);
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   if (report.creases) json["creases"] = creases_json(*report.creases);
-  json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));
+  if (has_cage()) json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));
   checkpointing_->describe(json);
   json["audit"] = audit_json(audit(template_mesh_));
   return json;
@@ -166,8 +184,8 @@ Json SubdivisionFitRun::report() const {
 
 void SubdivisionFitRun::summarize() const {
   const FitReport& report = result_.report;
-  std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
-            << to_text(mesh_check_) << to_text(limit_, mesh_check_.target_diagonal);
+  std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n' << to_text(mesh_check_);
+  if (has_cage()) std::cerr << to_text(limit_, mesh_check_.target_diagonal);
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();
 }

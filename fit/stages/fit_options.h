@@ -50,6 +50,11 @@ struct FitOptions {
   Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
   /// Least scaled Jacobian to aim at on the finest level, in [0, 0.8], as far as the distances allow; 0: none.
   double quality = kUsualQuality;
+  /// If the cage does not let the cells reach the quality, the finest mesh is freed from it: all vertices of that mesh
+  /// become degrees of freedom, and if that is not enough, it gets a layer of cells inside its boundary
+  /// (`internal::free_mesh`). The result then has no cage. Without effect for points, for templates of several regions
+  /// and if borders between groups are kept; not with cage_only or keep_states.
+  bool frees_mesh = false;
   SolveControl control{};
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
   bool keep_states = false;                      ///< fills FitResult::states

@@ -31,6 +31,9 @@ struct SolveControl {
 namespace internal {
 /// Throws InputError, naming `owner`, if a limit is out of its range.
 void check_control(const char* owner, const SolveControl& control);
+
+/// Returns the control of one part of a solve: the same, but progress from 0 to 1 is reported as from begin to end.
+SolveControl part_of_work(const SolveControl& control, double begin, double end);
 }  // namespace internal
 
 }  // namespace subvol

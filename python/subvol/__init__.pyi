@@ -253,6 +253,7 @@ def fit(
     surface: Literal["limit", "mesh"] = "limit",
     boundary: BoundaryRule = "catmull-clark",
     cage_only: bool = False,
+    keep_cage: bool = True,
     crease_angle: Optional[float] = None,
     keep_groups: bool = False,
     lambda_far: float = 1.0,

@@ -123,10 +123,8 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
   return steps;
 }
 
-/// Halves the steps of the vertices of inverted cells until no cell is inverted.
-/// origins  numbers of all vertices for the message.
-void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps,
-                   std::span<const Index> origins) {
+/// Halves the steps of the vertices of inverted cells until no cell is inverted, or until nothing is left of a step.
+void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps) {
   constexpr int kRounds = 20;  // 1e-6 of a step is none
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < number.size(); ++v)
@@ -147,6 +145,10 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
       mesh.positions[number[v]] = mesh.positions[v] + share[v] * steps[v];
     }
   }
+}
+
+/// origins  numbers of all vertices for the message.
+void require_upright(const VolumeMesh& mesh, std::span<const Index> origins) {
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
     if (!corners_positive(mesh, c))
       throw InputError("pillow: no direction keeps all cells valid around vertex " +
@@ -263,7 +265,7 @@ void carry_inner_creases(const VolumeMesh& mesh, std::span<const char> in_set, c
 /// Puts a layer inside some faces of the boundary of a set.
 /// origins  number in the caller's input of each vertex; those of the new ones are appended.
 VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set,
-                    std::vector<Index>& origins) {
+                    InvertedCells inverted, std::vector<Index>& origins) {
   const std::vector<Index> number = new_numbers(mesh.num_vertices(), faces);
   require_manifold(faces, number, origins);
   for (std::size_t v = 0; v < number.size(); ++v)
@@ -284,7 +286,8 @@ VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std:
     result.add_cell(face.size == 4 ? CellKind::hex : CellKind::prism, corners);
     if (!mesh.references.empty()) result.references.push_back(mesh.references[face.cell]);
   }
-  shorten_steps(result, number, steps, origins);
+  shorten_steps(result, number, steps);
+  if (inverted == InvertedCells::refused) require_upright(result, origins);
   const LayerKeys layer(faces);
   if (!mesh.face_groups.empty()) carry_inner_groups(mesh, in_set, layer, number, result.face_groups);
   if (!mesh.tags.creases.empty()) carry_inner_creases(mesh, in_set, layer, number, result);
@@ -299,11 +302,11 @@ std::vector<Index> own_numbers(const VolumeMesh& mesh) {
 
 }  // namespace
 
-VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
-  require_valid(mesh, "pillow");
+VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells, InvertedCells inverted) {
+  require_valid(mesh, "pillow", inverted);
   const std::vector<char> in_set = marked(mesh, cells);
   std::vector<Index> origins = own_numbers(mesh);
-  return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set, origins);
+  return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set, inverted, origins);
 }
 
 VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
@@ -316,7 +319,7 @@ VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
       in_set.push_back(mesh.references.empty() || result.references[c] == reference);
     std::vector<SetFace> faces = boundary_of_set(result, MeshTopology(result), in_set);
     if (takes) faces = chosen_parts(faces, result.num_vertices(), reference, takes);
-    if (!faces.empty()) result = pillowed(result, faces, in_set, origins);
+    if (!faces.empty()) result = pillowed(result, faces, in_set, InvertedCells::refused, origins);
   }
   return result;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/mesh/validate.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -32,7 +33,8 @@ namespace subvol {
 ///
 /// InputError: an invalid mesh; a cell number out of range or given twice; a set whose boundary is not a manifold (it
 /// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.
-VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {});
+VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {},
+                  InvertedCells inverted = InvertedCells::refused);
 
 /// Puts a layer of cells inside the boundary of each region: inside the mesh's boundary there, and on both sides of
 /// each interface. Interfaces keep their vertices.

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/freed_mesh.h"
+
+#include "subvol/base/format.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/optimize_mesh.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+#include "subvol/templates/pillow.h"
+
+#include <cstddef>
+#include <iterator>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace subvol::internal {
+
+namespace {
+
+constexpr double kEnoughOfGoal = 0.75;  // share of the quality below which a layer of cells is attempted
+constexpr double kFarther = 1.05;       // largest factor on the distances from the target
+
+/// What decides between two meshes of one target.
+struct FreedState {
+  double least_jacobian, mean_percent, max_percent;
+  std::size_t uncertified, pairs;
+};
+
+/// The state of a fit's mesh, and what replaces it.
+class MeshFreeing {
+ public:
+  MeshFreeing(const TriangleMesh& target, const FitOptions& options, FitResult& result)
+      : target_(target), options_(options), result_(result), runner_(options.control), start_(measured(result.mesh)) {
+    best_ = start_;
+  }
+  void run(const VolumeMesh& lifted);
+
+ private:
+  FreedState measured(const VolumeMesh& mesh) const;
+  bool gains(const FreedState& now) const;
+  bool attempt(const VolumeMesh& mesh, double begin, double end);
+  void conclude();
+
+  const TriangleMesh& target_;
+  const FitOptions& options_;
+  FitResult& result_;
+  StageRunner runner_;  ///< its clock began with the freeing
+  FreedState start_, best_;
+  std::optional<VolumeMesh> freed_;
+  FitReport found_;  ///< of freed_
+};
+
+FreedState MeshFreeing::measured(const VolumeMesh& mesh) const {
+  const QualityReport quality = measure_quality(mesh);
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
+  const SurfaceDistance distance = surface_distance(surface, target_);
+  const double to_percent = 100 / bounding_box_diagonal(target_);
+  return {quality.min_scaled_jacobian, to_percent * distance.mean(), to_percent * distance.max(),
+          quality.certificate.not_certified.size(), count_intersecting_pairs(surface)};
+}
+
+bool MeshFreeing::gains(const FreedState& now) const {
+  const std::optional<double>& tolerance = options_.tolerance_percent;
+  if (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) return false;
+  return now.least_jacobian > best_.least_jacobian && now.uncertified <= best_.uncertified && now.pairs <= best_.pairs &&
+         now.mean_percent <= kFarther * start_.mean_percent && now.max_percent <= kFarther * start_.max_percent;
+}
+
+/// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
+bool MeshFreeing::attempt(const VolumeMesh& mesh, double begin, double end) {
+  OptimizeOptions options{.quality = options_.quality,
+                          .mean_tolerance_percent = kFarther * start_.mean_percent,
+                          .max_tolerance_percent = kFarther * start_.max_percent};
+  if (options_.crease_angle_degrees) options.crease_angle_degrees = *options_.crease_angle_degrees;
+  options.control = part_of_work(options_.control, begin, end);
+  if (options.control.time_limit_seconds > 0) {
+    options.control.time_limit_seconds -= runner_.seconds();
+    if (options.control.time_limit_seconds <= 0) return false;
+  }
+  OptimizeResult optimized = optimize_mesh(mesh, &target_, options);
+  std::vector<StageRecord>& stages = result_.report.stages;
+  const std::size_t first = stages.size();
+  for (StageRecord& stage : optimized.report.stages) stage.name = "vertices freed, " + stage.name;
+  std::move(optimized.report.stages.begin(), optimized.report.stages.end(), std::back_inserter(stages));
+  const StopReason reason = optimized.report.stop_reason;
+  const std::string explanation = optimized.report.explanation;
+  const FreedState now = measured(optimized.mesh);
+  if (gains(now)) {
+    best_ = now;
+    freed_ = std::move(optimized.mesh);
+    found_ = std::move(optimized.report);
+  } else {
+    result_.report.undo_stages(first, stages.size());
+  }
+  if (reason != StopReason::time_limit && reason != StopReason::cancelled) return true;
+  result_.report.stop_reason = reason;
+  result_.report.explanation = explanation;
+  return false;
+}
+
+/// Makes the best mesh the result, if it is not the cage's.
+void MeshFreeing::conclude() {
+  if (!freed_) return;
+  FitReport& report = result_.report;
+  const std::size_t layer = freed_->num_cells() - result_.mesh.num_cells();
+  const bool ended_early =
+      report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
+  if (!ended_early) runner_.conclude(best_.mean_percent, options_.tolerance_percent, report);
+  report.explanation += "; all vertices were freed from the cage";
+  if (layer > 0) report.explanation += formatted(", with a layer of %zu cells inside the boundary", layer);
+  report.creases = found_.creases;
+  report.warnings.insert(report.warnings.end(), found_.warnings.begin(), found_.warnings.end());
+  result_.mesh = std::move(*freed_);
+  result_.cage = {};
+  result_.states.clear();
+}
+
+void MeshFreeing::run(const VolumeMesh& lifted) {
+  constexpr double kFirst = 0.5;  // share of the work in the first attempt
+  if (start_.least_jacobian >= options_.quality) return;
+  const double begin = 1 - kShareOfFreeing, middle = begin + kFirst * kShareOfFreeing;
+  const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells();
+  bool going = attempt(is_lifted ? lifted : result_.mesh, begin, middle);
+  if (going && best_.least_jacobian < kEnoughOfGoal * options_.quality) {
+    const VolumeMesh& core = freed_ ? *freed_ : is_lifted ? lifted : result_.mesh;
+    going = attempt(pillow(core, {}, InvertedCells::allowed), middle, 1);
+  }
+  conclude();
+  result_.report.seconds.emplace_back("freeing", runner_.seconds());
+}
+
+}  // namespace
+
+bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options) {
+  return options.quality > 0 && !options.keeps_groups && region_references(template_mesh).size() <= 1;
+}
+
+void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result) {
+  const StopReason reason = result.report.stop_reason;
+  if (reason != StopReason::converged && reason != StopReason::tolerance_missed) return;
+  try {
+    MeshFreeing(target, options, result).run(lifted);
+  } catch (const std::bad_alloc&) {
+    result.report.warnings.push_back("no memory was left to free the vertices of the finest mesh from the cage");
+  }
+}
+
+}  // namespace subvol::internal

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/stages/fit_options.h"
+#include "subvol/fit/subdivision_fit.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
+
+namespace subvol::internal {
+
+/// Share of the work that a fit leaves to `free_mesh`.
+inline constexpr double kShareOfFreeing = 0.4;
+
+/// Returns true if the mesh of a fit may be freed from its cage: the template has one region, whose volume cannot
+/// change against that of another, and borders between groups, which freed vertices do not follow, need not be kept.
+bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
+
+/// Raises the quality of a fit's finest mesh beyond what its cage allows. The cage has an eighth of the mesh's vertices,
+/// and its template may have smooth edges with one cell, which becomes flat there.
+///
+/// 1. All vertices of the mesh become degrees of freedom (`optimize_mesh`), from the state with the better cells.
+/// 2. If the least scaled Jacobian is still below three quarters of the quality, a layer of cells is put inside the
+///    boundary (`pillow`), and the vertices of that mesh are moved in the same way.
+///
+/// Each result is kept if its least scaled Jacobian is higher, no more cells lack a certificate, no more triangles of
+/// the boundary intersect, and the distances from the target are at most 5 % larger than those of the cage's mesh, and
+/// within the tolerance if they were. If one is kept, `result.mesh` is that mesh, without a cage and without states.
+///
+/// target   what the fit's mesh reproduces.
+/// options  of the fit; the time limit is what is left of it.
+/// lifted   the mesh in another state of the same fit, with better cells on a surface that may be farther off; without
+///          cells if there is none.
+/// result   of a fit that ran to its end; otherwise nothing is done.
+/// If memory runs out, the result stays as it is.
+void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result);
+
+}  // namespace subvol::internal
