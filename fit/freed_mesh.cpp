@@ -25,8 +25,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kEnoughOfGoal = 0.75;  // share of the quality below which a layer of cells is attempted
-constexpr double kFarther = 1.05;       // largest factor on the distances from the target
+constexpr double kLayerBelow = 0.75;  // share of the quality below which a layer of cells is attempted
+constexpr double kMostRise = 1.05;    // largest factor on the distances from the target
 
 /// What decides between two meshes of one target.
 struct FreedState {
@@ -70,15 +70,16 @@ FreedState MeshFreeing::measured(const VolumeMesh& mesh) const {
 bool MeshFreeing::gains(const FreedState& now) const {
   const std::optional<double>& tolerance = options_.tolerance_percent;
   if (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) return false;
-  return now.least_jacobian > best_.least_jacobian && now.uncertified <= best_.uncertified && now.pairs <= best_.pairs &&
-         now.mean_percent <= kFarther * start_.mean_percent && now.max_percent <= kFarther * start_.max_percent;
+  return now.least_jacobian > best_.least_jacobian && now.uncertified <= best_.uncertified &&
+         now.pairs <= best_.pairs && now.mean_percent <= kMostRise * start_.mean_percent &&
+         now.max_percent <= kMostRise * start_.max_percent;
 }
 
 /// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
 bool MeshFreeing::attempt(const VolumeMesh& mesh, double begin, double end) {
   OptimizeOptions options{.quality = options_.quality,
-                          .mean_tolerance_percent = kFarther * start_.mean_percent,
-                          .max_tolerance_percent = kFarther * start_.max_percent};
+                          .mean_tolerance_percent = kMostRise * start_.mean_percent,
+                          .max_tolerance_percent = kMostRise * start_.max_percent};
   if (options_.crease_angle_degrees) options.crease_angle_degrees = *options_.crease_angle_degrees;
   options.control = part_of_work(options_.control, begin, end);
   if (options.control.time_limit_seconds > 0) {
@@ -111,9 +112,8 @@ void MeshFreeing::conclude() {
   if (!freed_) return;
   FitReport& report = result_.report;
   const std::size_t layer = freed_->num_cells() - result_.mesh.num_cells();
-  const bool ended_early =
-      report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
-  if (!ended_early) runner_.conclude(best_.mean_percent, options_.tolerance_percent, report);
+  const bool ended_early = report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
+  if (!ended_early) conclude_by_distance(best_.mean_percent, options_.tolerance_percent, report);
   report.explanation += "; all vertices were freed from the cage";
   if (layer > 0) report.explanation += formatted(", with a layer of %zu cells inside the boundary", layer);
   report.creases = found_.creases;
@@ -129,7 +129,7 @@ void MeshFreeing::run(const VolumeMesh& lifted) {
   const double begin = 1 - kShareOfFreeing, middle = begin + kFirst * kShareOfFreeing;
   const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells();
   bool going = attempt(is_lifted ? lifted : result_.mesh, begin, middle);
-  if (going && best_.least_jacobian < kEnoughOfGoal * options_.quality) {
+  if (going && best_.least_jacobian < kLayerBelow * options_.quality) {
     const VolumeMesh& core = freed_ ? *freed_ : is_lifted ? lifted : result_.mesh;
     going = attempt(pillow(core, {}, InvertedCells::allowed), middle, 1);
   }

@@ -139,6 +139,7 @@ Json OptimizeRun::report() const {
     json["regions"] = regions_json(*mesh_check_.regions, &start);
   }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
+  if (result_.report.creases) json["creases"] = creases_json(*result_.report.creases);
   checkpointing_->describe(json);
   json["not_certified_cells"] = not_certified_cells(mesh_check_);
   return json;
@@ -150,6 +151,7 @@ void OptimizeRun::summarize() const {
             << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min "
             << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
             << to_text(mesh_check_);
+  if (result_.report.creases) std::cerr << to_text(*result_.report.creases);
   const std::vector<Index> left = not_certified_cells(mesh_check_);
   for (std::size_t i = 0; i < std::min(left.size(), kMostNamed); ++i)
     std::cerr << "cell " << left[i] << " is not proved positive\n";

@@ -115,15 +115,21 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
   if (last && last->ended == MinimizerStop::infeasible_start) {
     report.stop_reason = StopReason::stalled;
     report.explanation = last->name + " could not begin: " + last->stop;
-  } else if (tolerance_percent && mean_percent > *tolerance_percent) {
-    report.stop_reason = StopReason::tolerance_missed;
-    report.explanation =
-        formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
   } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
              control_.max_iterations > 0) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
                                    control_.max_iterations, mean_percent);
+  } else {
+    conclude_by_distance(mean_percent, tolerance_percent, report);
+  }
+}
+
+void conclude_by_distance(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) {
+  if (tolerance_percent && mean_percent > *tolerance_percent) {
+    report.stop_reason = StopReason::tolerance_missed;
+    report.explanation =
+        formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
   } else {
     report.stop_reason = StopReason::converged;
     report.explanation = formatted("all stages done, mean distance %.4g %%", mean_percent);

@@ -83,4 +83,7 @@ class StageRunner {
   std::shared_ptr<WorkShare> work_ = std::make_shared<WorkShare>();  ///< never null; the same one in all copies
 };
 
+/// Sets the report's stop reason and explanation for a fit that is done: only a tolerance may be missed.
+void conclude_by_distance(double mean_percent, std::optional<double> tolerance_percent, FitReport& report);
+
 }  // namespace subvol::internal

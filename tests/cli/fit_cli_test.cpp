@@ -4,6 +4,7 @@
 #include "samples/shapes.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "tests/support/carved_torus.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/workplace.h"
@@ -62,6 +63,44 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
       CHECK(stage.contains(key));
   }
   CHECK(report.at("stages").back().at("energy").at("total") > 0);
+}
+
+TEST_CASE("A fit of which only cells are asked for frees poor ones from the cage, and says so", "[cli][slow]") {
+  const Workplace place(subvol::test::carved_torus_sample());
+  const auto fitted = [&](const std::string& options) {
+    const Run run = place.run(kFit + "--levels 1 --force -o out.mesh --report r.json " + options);
+    INFO(run.err);
+    CHECK(run.status == 0);
+    return place.json("r.json");
+  };
+  const auto kept = fitted("-o cage:cage.mesh"), freed = fitted("-o out.glb");
+  CHECK(kept.contains("cage"));
+  for (const char* key : {"cage", "limit_surface_distance"}) CHECK_FALSE(freed.contains(key));
+  CHECK(freed.contains("audit"));
+  CHECK(kept.at("explanation").get<std::string>().find("freed") == std::string::npos);
+  CHECK(freed.at("explanation").get<std::string>().find("freed from the cage") != std::string::npos);
+  CHECK(freed.at("seconds").contains("freeing"));
+  const auto least = [](const auto& report) {
+    return report.at("quality").at("min_scaled_jacobian").template get<double>();
+  };
+  CHECK(least(freed) > 0.5);
+  CHECK(least(kept) < 0.3);
+  for (const char* scenes : {"-o cage:cage.mesh", "--surface limit", "--cage-only", "-o animation:a.html"})
+    CHECK(fitted(scenes).contains("cage"));
+  CHECK(place.run(kFit + "--levels 1 --force -o out.glb --report r.json").status == 0);
+  CHECK(place.json("r.json").contains("cage"));  // a scene shows the limit surface
+}
+
+TEST_CASE("A fit that frees its mesh goes on where it was ended", "[cli][slow]") {
+  const Workplace place(subvol::test::carved_torus_sample());
+  const std::string fit = kFit + "--levels 1 ";
+  REQUIRE(place.run(fit + "-o whole.mesh --checkpoint c --every 0").status == 0);
+  REQUIRE(place.run(fit + "-o again.mesh --resume c").status == 0);
+  CHECK(content_of(place / "whole.mesh") == content_of(place / "again.mesh"));
+  const Run other = place.run(fit + "-o other.mesh -o cage:cage.mesh --resume c");
+  CHECK(other.status == 1);
+  INFO(other.err);
+  CHECK(other.err.find("result") != std::string::npos);
 }
 
 TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "[cli][slow]") {

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/freed_mesh.h"
+#include "samples/shapes.h"
+#include "subvol/base/error.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/subdivision_fit.h"
+#include "subvol/subdivision/audit.h"
+#include "tests/support/carved_torus.h"
+
+#include <catch2/catch.hpp>
+
+#include <string>
+
+using namespace subvol;
+using namespace subvol::internal;
+using namespace subvol::test;
+
+TEST_CASE("A mesh that its cage keeps poor is freed, and gets a layer of cells", "[slow]") {
+  const auto [name, torus, carved] = carved_torus_sample();
+  REQUIRE(!audit(carved).warnings.empty());
+  const FitResult kept = fit_subdivision_volume(torus, carved, {.levels = 1});
+  const FitResult freed = fit_subdivision_volume(torus, carved, {.levels = 1, .frees_mesh = true});
+  const MeshCheck before = check_mesh(kept.mesh, &torus), after = check_mesh(freed.mesh, &torus);
+  CHECK(kept.cage.num_cells() > 0);
+  CHECK(freed.cage.num_cells() == 0);
+  CHECK(freed.states.empty());
+  CHECK(after.valid());
+  CHECK(before.quality->min_scaled_jacobian < 0.3);
+  CHECK(after.quality->min_scaled_jacobian > 0.5);
+  CHECK(after.mean_distance_percent() <= 1.05 * before.mean_distance_percent());
+  CHECK(after.max_distance_percent() <= 1.05 * before.max_distance_percent());
+  CHECK(freed.mesh.num_cells() > kept.mesh.num_cells());
+  CHECK(freed.report.explanation.find("freed from the cage, with a layer of ") != std::string::npos);
+  CHECK(freed.report.stop_reason == StopReason::converged);
+}
+
+TEST_CASE("A mesh whose cells are good keeps its cage", "[slow]") {
+  const samples::Sample ball = samples::ball_sample();
+  const FitOptions options{.levels = 1, .quality = 0.2, .frees_mesh = true};
+  CHECK(fit_subdivision_volume(ball.target, ball.template_mesh, options).cage.num_cells() > 0);
+}
+
+TEST_CASE("A mesh that must keep its cage is not freed") {
+  const samples::Sample ball = samples::ball_sample();
+  const auto fit = [&](const FitOptions& options) {
+    return fit_subdivision_volume(ball.target, ball.template_mesh, options);
+  };
+  CHECK_THROWS_AS(fit({.cage_only = true, .frees_mesh = true}), InputError);
+  CHECK_THROWS_AS(fit({.frees_mesh = true, .keep_states = true}), InputError);
+  CHECK(can_be_freed(ball.template_mesh, {}));
+  CHECK_FALSE(can_be_freed(ball.template_mesh, {.keeps_groups = true}));
+  CHECK_FALSE(can_be_freed(ball.template_mesh, {.quality = 0}));
+  VolumeMesh two = ball.template_mesh;
+  two.references.assign(two.num_cells(), 1);
+  two.references[0] = 2;
+  CHECK_FALSE(can_be_freed(two, {}));
+}
+
+TEST_CASE("A fit that frees its mesh reports progress that never falls, and can be cancelled", "[slow]") {
+  const auto [name, torus, carved] = carved_torus_sample();
+  double last = 0;
+  bool falls = false, is_freeing = false;
+  FitOptions options{.levels = 1, .frees_mesh = true};
+  options.control.progress = [&](const FitProgress& progress) {
+    falls = falls || progress.fraction < last;
+    last = progress.fraction;
+    is_freeing = progress.fraction > 1 - kShareOfFreeing;
+    return !is_freeing;
+  };
+  const FitResult fit = fit_subdivision_volume(torus, carved, options);
+  CHECK(is_freeing);
+  CHECK_FALSE(falls);
+  CHECK(fit.report.stop_reason == StopReason::cancelled);
+  CHECK(check_mesh(fit.mesh).valid());
+}
