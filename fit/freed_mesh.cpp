@@ -13,8 +13,8 @@
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/pillow.h"
 
+#include <array>
 #include <cstddef>
-#include <iterator>
 #include <new>
 #include <optional>
 #include <string>
@@ -27,6 +27,9 @@ namespace {
 
 constexpr double kLayerBelow = 0.75;  // share of the quality below which a layer of cells is attempted
 constexpr double kMostRise = 1.05;    // largest factor on the distances from the target
+/// Tolerances of an optimization as shares of the distances of the cage's mesh: its own, and if the result is farther
+/// off, less.
+constexpr std::array kDistanceShares{1.05, 0.7};
 
 /// What decides between two meshes of one target.
 struct FreedState {
@@ -45,8 +48,10 @@ class MeshFreeing {
 
  private:
   FreedState measured(const VolumeMesh& mesh) const;
+  bool is_too_far(const FreedState& now) const;
   bool gains(const FreedState& now) const;
-  bool attempt(const VolumeMesh& mesh, double begin, double end);
+  bool attempt(VolumeMesh mesh, double begin, double end);
+  std::optional<FreedState> optimize(VolumeMesh& mesh, double distance_share, SolveControl control);
   void conclude();
 
   const TriangleMesh& target_;
@@ -67,44 +72,63 @@ FreedState MeshFreeing::measured(const VolumeMesh& mesh) const {
           quality.certificate.not_certified.size(), count_intersecting_pairs(surface)};
 }
 
-bool MeshFreeing::gains(const FreedState& now) const {
+/// Returns true if a state is too far from the target.
+bool MeshFreeing::is_too_far(const FreedState& now) const {
   const std::optional<double>& tolerance = options_.tolerance_percent;
-  if (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) return false;
+  return (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) ||
+         now.mean_percent > kMostRise * start_.mean_percent || now.max_percent > kMostRise * start_.max_percent;
+}
+
+bool MeshFreeing::gains(const FreedState& now) const {
   return now.least_jacobian > best_.least_jacobian && now.uncertified <= best_.uncertified &&
-         now.pairs <= best_.pairs && now.mean_percent <= kMostRise * start_.mean_percent &&
-         now.max_percent <= kMostRise * start_.max_percent;
+         now.pairs <= best_.pairs && !is_too_far(now);
 }
 
 /// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
-bool MeshFreeing::attempt(const VolumeMesh& mesh, double begin, double end) {
+bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
+  for (const double share : kDistanceShares) {
+    const std::optional<FreedState> now = optimize(mesh, share, part_of_work(options_.control, begin, end));
+    if (!now) return false;
+    if (!is_too_far(*now)) break;
+    begin = (begin + end) / 2;
+  }
+  return true;
+}
+
+/// Optimizes a mesh within a share of the cage's distances, records it, and keeps it if it is better. Returns its new
+/// state, or nothing if the work must end.
+std::optional<FreedState> MeshFreeing::optimize(VolumeMesh& mesh, double distance_share, SolveControl control) {
   OptimizeOptions options{.quality = options_.quality,
-                          .mean_tolerance_percent = kMostRise * start_.mean_percent,
-                          .max_tolerance_percent = kMostRise * start_.max_percent};
+                          .mean_tolerance_percent = distance_share * start_.mean_percent,
+                          .max_tolerance_percent = distance_share * start_.max_percent,
+                          .control = std::move(control)};
   if (options_.crease_angle_degrees) options.crease_angle_degrees = *options_.crease_angle_degrees;
-  options.control = part_of_work(options_.control, begin, end);
-  if (options.control.time_limit_seconds > 0) {
-    options.control.time_limit_seconds -= runner_.seconds();
-    if (options.control.time_limit_seconds <= 0) return false;
+  if (double& limit = options.control.time_limit_seconds; limit > 0) {
+    limit -= runner_.seconds();
+    if (limit <= 0) return std::nullopt;
   }
   OptimizeResult optimized = optimize_mesh(mesh, &target_, options);
+  mesh = std::move(optimized.mesh);
+  const FreedState now = measured(mesh);
+  const bool is_kept = gains(now);
   std::vector<StageRecord>& stages = result_.report.stages;
-  const std::size_t first = stages.size();
-  for (StageRecord& stage : optimized.report.stages) stage.name = "vertices freed, " + stage.name;
-  std::move(optimized.report.stages.begin(), optimized.report.stages.end(), std::back_inserter(stages));
-  const StopReason reason = optimized.report.stop_reason;
-  const std::string explanation = optimized.report.explanation;
-  const FreedState now = measured(optimized.mesh);
-  if (gains(now)) {
-    best_ = now;
-    freed_ = std::move(optimized.mesh);
-    found_ = std::move(optimized.report);
-  } else {
-    result_.report.undo_stages(first, stages.size());
+  for (StageRecord& stage : optimized.report.stages) {
+    stage.name = "vertices freed, " + stage.name;
+    stage.kept = stage.kept && is_kept;
+    stages.push_back(std::move(stage));
   }
-  if (reason != StopReason::time_limit && reason != StopReason::cancelled) return true;
-  result_.report.stop_reason = reason;
-  result_.report.explanation = explanation;
-  return false;
+  FitReport& report = optimized.report;
+  const bool ended_early = report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
+  if (ended_early) {
+    result_.report.stop_reason = report.stop_reason;
+    result_.report.explanation = report.explanation;
+  }
+  if (is_kept) {
+    best_ = now;
+    freed_ = mesh;
+    found_ = std::move(report);
+  }
+  return ended_early ? std::nullopt : std::optional(now);
 }
 
 /// Makes the best mesh the result, if it is not the cage's.

@@ -104,6 +104,8 @@ constexpr std::array<QualityAttempt, 9> kQualityAttempts{{{QualityAttempt::Kind:
                                                           {QualityAttempt::Kind::draw_back, 100, true},
                                                           {QualityAttempt::Kind::draw_back, 1000, true},
                                                           {QualityAttempt::Kind::draw_back, 10000, true}}};
+/// Number of attempts that are made if the mesh may be freed from the cage afterwards.
+constexpr std::size_t kAttemptsBeforeFreeing = 2;
 /// Steps of the lift when the surface is drawn back: the cells have been lifted before.
 constexpr int kLaterLiftSteps = 20;
 
@@ -122,7 +124,8 @@ bool SubdivisionFit::raise_quality() {
   double best_jacobian = before->least_jacobian;
   const bool is_poor = before->least_jacobian < kPoorShare * options_.quality;
   bool is_lifted = false;
-  const auto attempts = std::span(kQualityAttempts).first(options_.frees_mesh ? 1 : kQualityAttempts.size());
+  const auto attempts =
+      std::span(kQualityAttempts).first(options_.frees_mesh ? kAttemptsBeforeFreeing : kQualityAttempts.size());
   for (const QualityAttempt& attempt : attempts) {
     const bool has_gained = best_jacobian > before->least_jacobian;
     const bool is_lift = attempt.kind == QualityAttempt::Kind::lift;
@@ -272,12 +275,17 @@ FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& t
   used.frees_mesh = options.frees_mesh && can_be_freed(template_mesh, options);
   if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, used).run();
   const TriangleMesh& surface = matched.outer ? *matched.outer : target;
+  const StageRunner clock(options.control);
   if (used.frees_mesh) used.control = part_of_work(options.control, 0, 1 - kShareOfFreeing);
   SubdivisionFit fit(FitTarget(surface), template_mesh, used);
   FitResult result = fit.run();
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
   if (used.frees_mesh) {
     used.control = options.control;
+    if (double& limit = used.control.time_limit_seconds; limit > 0) {
+      limit -= clock.seconds();
+      if (limit <= 0) return result;
+    }
     free_mesh(surface, used, fit.take_lifted_mesh(), result);
   }
   return result;
