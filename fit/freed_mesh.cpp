@@ -13,7 +13,6 @@
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/pillow.h"
 
-#include <array>
 #include <cstddef>
 #include <new>
 #include <optional>
@@ -27,9 +26,9 @@ namespace {
 
 constexpr double kLayerBelow = 0.75;  // share of the quality below which a layer of cells is attempted
 constexpr double kMostRise = 1.05;    // largest factor on the distances from the target
-/// Tolerances of an optimization as shares of the distances of the cage's mesh: its own, and if the result is farther
-/// off, less.
-constexpr std::array kDistanceShares{1.05, 0.7};
+/// Share of the distances of the cage's mesh that is the tolerance of a second optimization, if the first result is
+/// farther off than that mesh may be.
+constexpr double kNearerShare = 0.7;
 
 /// What decides between two meshes of one target.
 struct FreedState {
@@ -86,7 +85,7 @@ bool MeshFreeing::gains(const FreedState& now) const {
 
 /// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
 bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
-  for (const double share : kDistanceShares) {
+  for (const double share : {kMostRise, kNearerShare}) {
     const std::optional<FreedState> now = optimize(mesh, share, part_of_work(options_.control, begin, end));
     if (!now) return false;
     if (!is_too_far(*now)) break;
