@@ -135,8 +135,9 @@ void MeshFreeing::conclude() {
   if (!freed_) return;
   FitReport& report = result_.report;
   const std::size_t layer = freed_->num_cells() - result_.mesh.num_cells();
-  const bool ended_early = report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
-  if (!ended_early) conclude_by_distance(best_.mean_percent, options_.tolerance_percent, report);
+  const StopReason reason = report.stop_reason;
+  if (reason == StopReason::converged || reason == StopReason::tolerance_missed)
+    conclude_by_distance(best_.mean_percent, options_.tolerance_percent, report);
   report.explanation += "; all vertices were freed from the cage";
   if (layer > 0) report.explanation += formatted(", with a layer of %zu cells inside the boundary", layer);
   report.creases = found_.creases;
@@ -168,7 +169,7 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options) {
 
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result) {
   const StopReason reason = result.report.stop_reason;
-  if (reason != StopReason::converged && reason != StopReason::tolerance_missed) return;
+  if (reason == StopReason::time_limit || reason == StopReason::cancelled || reason == StopReason::memory_limit) return;
   try {
     MeshFreeing(target, options, result).run(lifted);
   } catch (const std::bad_alloc&) {

@@ -30,7 +30,8 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 /// options  of the fit; the time limit is what is left of it.
 /// lifted   the mesh in another state of the same fit, with better cells on a surface that may be farther off; without
 ///          cells if there is none.
-/// result   of a fit that ran to its end; otherwise nothing is done.
+/// result   of a fit; nothing is done if a limit or the caller ended it. If it stalled, its mesh is that of a lower
+///          level.
 /// If memory runs out, the result stays as it is.
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result);
 

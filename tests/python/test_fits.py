@@ -46,6 +46,19 @@ class Fits(InFolder):
         from_arrays = subvol.fit(subvol.read(BALL[0]), subvol.read(BALL[1]), levels=1)
         np.testing.assert_array_equal(from_arrays.mesh.points, fit.mesh.points)
 
+    def test_a_mesh_that_is_freed_from_its_cage_is_the_programs_bit_by_bit(self):
+        self.run_program("template", "grid", "torus_target.off", "--size", "0.4", "-o", "grid.mesh")
+        self.run_program("template", "carve", "grid.mesh", "--inside", "torus_target.off", "-o", "carved.mesh")
+        self.run_program("fit", "torus_target.off", "--template", "carved.mesh", "--levels", "1", "-o", "freed.mesh")
+        freed = subvol.fit("torus_target.off", "carved.mesh", levels=1, keep_cage=False)
+        self.assertIsNone(freed.cage)
+        self.assertNotIn("cage", freed.report)
+        subvol.write("again.mesh", freed)
+        self.assert_same_file("freed.mesh", "again.mesh")
+        kept = subvol.fit("torus_target.off", "carved.mesh", levels=1)
+        self.assertGreater(freed.report["quality"]["min_scaled_jacobian"],
+                           2 * kept.report["quality"]["min_scaled_jacobian"])
+
     def test_a_fit_of_curved_cells_is_the_programs_bit_by_bit(self):
         self.run_program("fit", BALL[0], "--template", BALL[1], "--order", "2", "-o", "a.vtu")
         fit = subvol.fit(*BALL, order=2)
