@@ -12,6 +12,8 @@
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/stages/untangle.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -29,7 +31,7 @@ namespace {
 
 /// Weight of the cells' shape against the surface while cells are untangled with a sliding boundary.
 constexpr double kUntangleLambda = 0.01;
-/// Cells with a lower scaled Jacobian may move the corner vertices of the surface's sharp edges.
+/// Cells with a lower scaled Jacobian may move the corner vertices of the surface's sharp edges, at first.
 constexpr double kPoorJacobian = 0.2;
 
 /// Estimates of the work: its share when untangling and the rounds end, the portion of the rest that the first quality
@@ -126,10 +128,12 @@ class MeshOptimizer : OptimizeDriver {
   /// Makes attempts that hold more and more until no region's volume changes, and takes the soundest. start: the state
   /// before. Returns false if the work must end.
   bool attempt_soundly(const Measured& start, const VolumeMesh& original);
+  bool repeat_while_poor(const VolumeMesh& original);
   /// Makes an outcome the present state again.
   void take(Outcome reached);
 
   std::vector<Index> uncertified_;
+  double releases_below_ = kPoorJacobian;  ///< cells below it may move corners of sharp edges
   bool gains_ended_ = false;  ///< true if the rounds ended because they no longer gained
 };
 
@@ -185,7 +189,7 @@ bool MeshOptimizer::improve() {
       ideal_boxes_ = ideal_boxes(mesh_, mesh_.positions, target_.surface.volume(), 1);
     std::vector<Index> poor;
     for (std::size_t c = 0; c < minima.size(); ++c)
-      if (minima[c] < kPoorJacobian) poor.push_back(static_cast<Index>(c));
+      if (minima[c] < releases_below_) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
     if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kSteps)) return false;
@@ -340,12 +344,35 @@ bool MeshOptimizer::attempt_soundly(const Measured& start, const VolumeMesh& ori
   return going;
 }
 
+/// Does the work again from the state reached, as long as the quality is missed and the least scaled Jacobian rises:
+/// ideal boxes and correspondences are others by then, and all cells below the quality may move corner vertices. A mesh
+/// with interfaces has been through several attempts and is left as it is. Returns false if the work must end.
+bool MeshOptimizer::repeat_while_poor(const VolumeMesh& original) {
+  constexpr int kMostRepeats = 2;
+  constexpr double kWorthwhile = 0.01;  // least rise of the least scaled Jacobian for which there is another repeat
+  if (options_.quality == 0 || !interfaces_.empty()) return true;
+  releases_below_ = std::max(kPoorJacobian, options_.quality);
+  Measured before = measure();
+  for (int i = 0; i < kMostRepeats && before.uncertified == 0 && before.least_jacobian < options_.quality; ++i) {
+    Outcome reached = outcome();
+    mesh_.tags = original.tags;
+    const bool going = attempt(before.least_jacobian);
+    const Measured now = measure();
+    const bool is_gain = is_better(now, before);
+    if (!is_gain) take(std::move(reached));
+    if (!going) return false;
+    if (!is_gain || now.least_jacobian < before.least_jacobian + kWorthwhile) break;
+    before = now;
+  }
+  return true;
+}
+
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   measure_start();
   const Measured start = measure();
   std::vector<Vec3> start_positions = mesh_.positions;
   const std::size_t warnings_before = report_.warnings.size();
-  const bool going = attempt_soundly(start, original);
+  const bool going = attempt_soundly(start, original) && repeat_while_poor(original);
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   const bool is_kept = start.uncertified == 0 && !wants_other_sizes

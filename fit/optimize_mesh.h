@@ -51,7 +51,8 @@ struct OptimizeResult {
 /// are too far from the surface. At last, `QualityStages` raise the lowest scaled Jacobians, to the
 /// quality that is asked for and then, if it is reached, to 0.1 more; the state before is kept unless the least one is
 /// higher, no more cells are uncertified, no more faces meet, and the distances are within nine tenths of the mean
-/// tolerance and the largest, or no larger than before.
+/// tolerance and the largest, or no larger than before. If the quality is missed, all this is repeated up to twice from
+/// the state reached, as long as that gains; not for meshes of several regions.
 ///
 /// mesh    must pass `validate` except for inverted cells and unused vertices, else InputError. Without a target, the
 ///         vertices where its sharp edges meet (`FollowedCreases`) stay fixed, except those of cells that are badly

@@ -114,7 +114,7 @@ TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "
 
 TEST_CASE("A fit converges only where its file and its limit surface are within the tolerance", "[cli][slow]") {
   const Workplace place;
-  const std::string fit = kFit + "--levels 1 --chord 5 --force -o out.mesh -o out.glb --report r.json ";
+  const std::string fit = kFit + "--levels 1 --chord 5 --force -o out.mesh -o cage:c.mesh -o out.glb --report r.json ";
   const auto farthest = [](const nlohmann::json& report) {
     const auto& limit = report.at("limit_surface_distance");
     CHECK(limit.at("chord_error_percent") < 0.01);  // whatever the scene's are
