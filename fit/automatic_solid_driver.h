@@ -70,7 +70,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   std::optional<SurfaceDiagnosis> diagnosis_;  ///< of the target; none: no attempt has been without a template
 
  private:
-  /// Returns the largest miss of the target's small features by a surface, in the target's unit and coordinates.
+  /// Records in a trial the largest misses of the target's small features by a surface, in the target's unit and
+  /// coordinates.
   void measure_features(const ClosestPoint& surface, AutomaticFitTrial& trial) const;
   /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
   std::optional<CreaseDistance> distance_of_edges() const;

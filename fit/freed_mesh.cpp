@@ -13,6 +13,7 @@
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/pillow.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <new>
 #include <optional>
@@ -29,6 +30,11 @@ constexpr double kMostRise = 1.05;    // largest factor on the distances from th
 /// Share of the distances of the cage's mesh that is the tolerance of a second optimization, if the first result is
 /// farther off than that mesh may be.
 constexpr double kNearerShare = 0.7;
+
+/// Largest distance from the target, in percent of its diagonal, at which a mesh is freed: one farther off is not in
+/// place.
+constexpr double kMostFreedPercent = 50;
+constexpr double kNoCreaseAngle = 180;
 
 /// What decides between two meshes of one target.
 struct FreedState {
@@ -51,6 +57,7 @@ class MeshFreeing {
   bool gains(const FreedState& now) const;
   bool attempt(VolumeMesh mesh, double begin, double end);
   std::optional<FreedState> optimize(VolumeMesh& mesh, double distance_share, SolveControl control);
+  void try_to_free(const VolumeMesh& lifted);
   void conclude();
 
   const TriangleMesh& target_;
@@ -85,44 +92,47 @@ bool MeshFreeing::gains(const FreedState& now) const {
 
 /// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
 bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
-  for (const double share : {kMostRise, kNearerShare}) {
-    const std::optional<FreedState> now = optimize(mesh, share, part_of_work(options_.control, begin, end));
-    if (!now) return false;
-    if (!is_too_far(*now)) break;
-    begin = (begin + end) / 2;
-  }
-  return true;
+  const double middle = (begin + end) / 2;
+  const std::size_t first = result_.report.stages.size();
+  const double before = best_.least_jacobian;
+  std::optional<FreedState> now = optimize(mesh, kMostRise, part_of_work(options_.control, begin, middle));
+  if (now && is_too_far(*now)) now = optimize(mesh, kNearerShare, part_of_work(options_.control, middle, end));
+  if (best_.least_jacobian == before) result_.report.undo_stages(first, result_.report.stages.size());
+  return now.has_value();
 }
 
-/// Optimizes a mesh within a share of the cage's distances, records it, and keeps it if it is better. Returns its new
-/// state, or nothing if the work must end.
+/// Optimizes a mesh within a share of the cage's distances, and keeps it if it is better. Returns its new state, or
+/// nothing if the work must end.
 std::optional<FreedState> MeshFreeing::optimize(VolumeMesh& mesh, double distance_share, SolveControl control) {
+  constexpr double kLeastTolerance = 1e-6, kMostTolerance = 100;  // percent
+  constexpr double kLeastSeconds = 1e-3;
+  if (!runner_.in_time("the freeing of the mesh", result_.report)) return std::nullopt;
+  const auto tolerance = [&](double percent) {
+    return std::clamp(distance_share * percent, kLeastTolerance, kMostTolerance);
+  };
   OptimizeOptions options{.quality = options_.quality,
-                          .mean_tolerance_percent = distance_share * start_.mean_percent,
-                          .max_tolerance_percent = distance_share * start_.max_percent,
+                          .mean_tolerance_percent = tolerance(start_.mean_percent),
+                          .max_tolerance_percent = tolerance(start_.max_percent),
                           .control = std::move(control)};
-  if (options_.crease_angle_degrees) options.crease_angle_degrees = *options_.crease_angle_degrees;
-  if (double& limit = options.control.time_limit_seconds; limit > 0) {
-    limit -= runner_.seconds();
-    if (limit <= 0) return std::nullopt;
-  }
+  // As in the fit: without an angle, only the template's own creases are sharp.
+  const double usual_angle = mesh.tags.creases.empty() ? kNoCreaseAngle : kUsualCreaseAngle;
+  options.crease_angle_degrees = options_.crease_angle_degrees.value_or(usual_angle);
+  if (double& limit = options.control.time_limit_seconds; limit > 0)
+    limit = std::max(kLeastSeconds, limit - runner_.seconds());
   OptimizeResult optimized = optimize_mesh(mesh, &target_, options);
   mesh = std::move(optimized.mesh);
-  const FreedState now = measured(mesh);
-  const bool is_kept = gains(now);
-  std::vector<StageRecord>& stages = result_.report.stages;
-  for (StageRecord& stage : optimized.report.stages) {
-    stage.name = "vertices freed, " + stage.name;
-    stage.kept = stage.kept && is_kept;
-    stages.push_back(std::move(stage));
-  }
   FitReport& report = optimized.report;
+  for (StageRecord& stage : report.stages) {
+    stage.name = "vertices freed, " + stage.name;
+    result_.report.stages.push_back(std::move(stage));
+  }
   const bool ended_early = report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
   if (ended_early) {
     result_.report.stop_reason = report.stop_reason;
     result_.report.explanation = report.explanation;
   }
-  if (is_kept) {
+  const FreedState now = measured(mesh);
+  if (gains(now)) {
     best_ = now;
     freed_ = mesh;
     found_ = std::move(report);
@@ -140,6 +150,8 @@ void MeshFreeing::conclude() {
     conclude_by_distance(best_.mean_percent, options_.tolerance_percent, report);
   report.explanation += "; all vertices were freed from the cage";
   if (layer > 0) report.explanation += formatted(", with a layer of %zu cells inside the boundary", layer);
+  if (report.stop_reason != StopReason::converged)
+    report.explanation += formatted(", mean distance %.4g %%", best_.mean_percent);
   report.creases = found_.creases;
   report.warnings.insert(report.warnings.end(), found_.warnings.begin(), found_.warnings.end());
   result_.mesh = std::move(*freed_);
@@ -147,16 +159,25 @@ void MeshFreeing::conclude() {
   result_.states.clear();
 }
 
-void MeshFreeing::run(const VolumeMesh& lifted) {
+/// Makes the attempts. If memory runs out in one, what was kept before stays.
+void MeshFreeing::try_to_free(const VolumeMesh& lifted) {
   constexpr double kFirst = 0.5;  // share of the work in the first attempt
-  if (start_.least_jacobian >= options_.quality) return;
   const double begin = 1 - kShareOfFreeing, middle = begin + kFirst * kShareOfFreeing;
-  const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells();
-  bool going = attempt(is_lifted ? lifted : result_.mesh, begin, middle);
-  if (going && best_.least_jacobian < kLayerBelow * options_.quality) {
-    const VolumeMesh& core = freed_ ? *freed_ : is_lifted ? lifted : result_.mesh;
-    going = attempt(pillow(core, {}, InvertedCells::allowed), middle, 1);
+  const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells() &&
+                         measure_quality(lifted).min_scaled_jacobian > start_.least_jacobian;
+  const VolumeMesh& start = is_lifted ? lifted : result_.mesh;
+  try {
+    if (!attempt(start, begin, middle) || best_.least_jacobian >= kLayerBelow * options_.quality) return;
+    attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), middle, 1);
+  } catch (const std::bad_alloc&) {
+    result_.report.stop_reason = StopReason::memory_limit;
+    result_.report.explanation = "no memory was left to free the mesh from its cage";
   }
+}
+
+void MeshFreeing::run(const VolumeMesh& lifted) {
+  if (start_.least_jacobian >= options_.quality || start_.max_percent > kMostFreedPercent) return;
+  try_to_free(lifted);
   conclude();
   result_.report.seconds.emplace_back("freeing", runner_.seconds());
 }
@@ -170,11 +191,7 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options) {
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result) {
   const StopReason reason = result.report.stop_reason;
   if (reason == StopReason::time_limit || reason == StopReason::cancelled || reason == StopReason::memory_limit) return;
-  try {
-    MeshFreeing(target, options, result).run(lifted);
-  } catch (const std::bad_alloc&) {
-    result.report.warnings.push_back("no memory was left to free the vertices of the finest mesh from the cage");
-  }
+  MeshFreeing(target, options, result).run(lifted);
 }
 
 }  // namespace subvol::internal

@@ -32,7 +32,7 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 ///          cells if there is none.
 /// result   of a fit; nothing is done if a limit or the caller ended it. If it stalled, its mesh is that of a lower
 ///          level.
-/// If memory runs out, the result stays as it is.
+/// If memory runs out, what was kept before is the result, with the stop reason `memory_limit`.
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result);
 
 }  // namespace subvol::internal

@@ -304,15 +304,17 @@ void OptimizeDriver::measure_start() {
   report_.initial_distance_max_percent = 100 * start.max();
 }
 
-/// Measures the distances of the result as `check_mesh` does; the stages measured only at their own samples. Records
-/// how well sharp edges of a target are followed.
+/// Records how well sharp edges of a target are followed.
+void OptimizeDriver::measure_creases() {
+  if (own_boundary_ || creases_.curves().empty()) return;
+  CreaseDistance creases = creases_.distance(samples_.crease_edges, samples_.positions.apply(mesh_.positions), 1);
+  creases.farthest = target_.normalization.from_unit({creases.farthest})[0];
+  report_.creases = creases;
+}
+
+/// Measures the distances of the result as `check_mesh` does; the stages measured only at their own samples.
 void OptimizeDriver::measure_distance() {
   if (options_.fixed_boundary) return;
-  if (!own_boundary_ && !creases_.curves().empty()) {
-    CreaseDistance creases = creases_.distance(samples_.crease_edges, samples_.positions.apply(mesh_.positions), 1);
-    creases.farthest = target_.normalization.from_unit({creases.farthest})[0];
-    report_.creases = creases;
-  }
   const SurfaceDistance distance = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
   mean_percent_ = 100 * distance.mean();
   max_percent_ = 100 * distance.max();

@@ -75,6 +75,7 @@ class OptimizeDriver {
 
   void measure_start();
   Measured measure() const;
+  void measure_creases();
   void measure_distance();
   /// True if nothing but the start determines the volumes.
   bool keeps_volumes() const {

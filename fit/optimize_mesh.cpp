@@ -276,6 +276,7 @@ bool MeshOptimizer::steps_ran_out() const {
 }
 
 void MeshOptimizer::finish(bool going) {
+  measure_creases();
   if (going) measure_distance();
   report_.seconds = {{"total", runner_.seconds()}};
   if (!going) return;

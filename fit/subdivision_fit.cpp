@@ -8,6 +8,7 @@
 #include "subvol/fit/freed_mesh.h"
 #include "subvol/fit/subdivision_driver.h"
 #include "subvol/fit/target/region_matching.h"
+#include "subvol/subdivision/audit.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +16,9 @@
 #include <new>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace subvol {
 
@@ -42,7 +45,8 @@ class SubdivisionFit : SubdivisionDriver {
   bool raise_quality();
   bool flatten_interfaces();
 
-  VolumeMesh lifted_mesh_;
+  VolumeMesh lifted_mesh_;  ///< of the attempt with the best cells
+  double lifted_jacobian_ = 0;
 };
 
 /// Repeats the finest level with less and less weight on the cells' shape, until the wanted accuracy is reached.
@@ -147,7 +151,8 @@ bool SubdivisionFit::raise_quality() {
       return false;
     }
     is_lifted = now->least_jacobian > before->least_jacobian;
-    if (is_lifted && options_.frees_mesh) {
+    if (options_.frees_mesh && now->least_jacobian > std::max(lifted_jacobian_, before->least_jacobian)) {
+      lifted_jacobian_ = now->least_jacobian;
       lifted_mesh_ = current_mesh();
       lifted_mesh_.positions = target_.normalization.from_unit(std::move(lifted_mesh_.positions));
     }
@@ -268,6 +273,16 @@ FitResult SubdivisionFit::run() {
 
 }  // namespace
 
+namespace {
+
+/// Drops warnings of a template that are not true of a mesh that was freed from its cage.
+void drop_warnings(const std::vector<std::string>& dropped, FitReport& report) {
+  std::erase_if(report.warnings,
+                [&](const std::string& warning) { return std::ranges::find(dropped, warning) != dropped.end(); });
+}
+
+}  // namespace
+
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {
   const MatchedTarget matched = matched_target(target, template_mesh, options.control.cancelled);
@@ -275,6 +290,7 @@ FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& t
   used.frees_mesh = options.frees_mesh && can_be_freed(template_mesh, options);
   if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, used).run();
   const TriangleMesh& surface = matched.outer ? *matched.outer : target;
+  constexpr double kLeastSeconds = 1e-3;  // 0 is no limit
   const StageRunner clock(options.control);
   if (used.frees_mesh) used.control = part_of_work(options.control, 0, 1 - kShareOfFreeing);
   SubdivisionFit fit(FitTarget(surface), template_mesh, used);
@@ -283,10 +299,11 @@ FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& t
   if (used.frees_mesh) {
     used.control = options.control;
     if (double& limit = used.control.time_limit_seconds; limit > 0) {
-      limit -= clock.seconds();
-      if (limit <= 0) return result;
+      if (!clock.in_time("the freeing of the mesh", result.report)) return result;
+      limit = std::max(kLeastSeconds, limit - clock.seconds());
     }
     free_mesh(surface, used, fit.take_lifted_mesh(), result);
+    if (result.cage.num_cells() == 0) drop_warnings(audit(template_mesh).warnings, result.report);
   }
   return result;
 }

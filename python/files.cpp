@@ -98,7 +98,7 @@ void write_curved(Writing& writing, const CurvedMesh& curved) {
 
 void write_fit(Writing& writing, const Fitted& fit) {
   std::vector<cli::Part> parts{cli::Part::cutaway, cli::Part::boundary};
-  if (!fit.curved) parts.push_back(cli::Part::cage);
+  if (fit.cage) parts.push_back(cli::Part::cage);
   if (!fit.states.empty()) parts.push_back(cli::Part::animation);
   const cli::Output output = writing.output(parts);
   if (output.part == cli::Part::animation)
@@ -110,6 +110,7 @@ void write_fit(Writing& writing, const Fitted& fit) {
     cli::write_output(output, *fit.curved, writing.options);
     return writing.judge(output, fit.curved->mesh);
   }
+  if (!fit.cage) return cli::write_output(output, *fit.mesh, writing.options);
   TessellatedSurface limit;
   if (cli::shows_surface(output)) limit = cli::tessellated_limit(*fit.cage, writing.options);
   cli::write_output(output, *fit.cage, *fit.mesh, &limit, writing.options);

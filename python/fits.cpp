@@ -50,6 +50,8 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
   take_fit_options(keywords, options);
+  if (!keeps_cage && (options.cage_only || options.keep_states))
+    throw InputError("fit: keep_cage=False does not go with cage_only or keep_states");
   return options;
 }
 
@@ -316,8 +318,10 @@ void add_fits(py::module_& module) {
   py::class_<Fitted, Reported, std::shared_ptr<Fitted>> type(module, "FitResult", "What `fit` returns.");
   type.def_property_readonly("template", [](const Fitted& fit) { return fit.template_mesh; },
                              "The template: VolumeMesh.");
-  type.def_property_readonly("cage", [](const Fitted& fit) { return fit.cage; },
-                             "The control mesh whose limit surface is fitted: VolumeMesh; None of curved cells.");
+  type.def_property_readonly(
+      "cage", [](const Fitted& fit) { return fit.cage; },
+      "The control mesh whose limit surface is fitted: VolumeMesh; None of curved cells and of a mesh "
+      "that was freed from it.");
   type.def_property_readonly("mesh", &mesh_of<Fitted>,
                              "The finest mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
   type.def_property_readonly(

@@ -30,8 +30,8 @@
 namespace subvol::cli {
 namespace {
 
-/// Returns true if cells are asked for, and nothing that needs the cage.
-bool asks_for_cells_alone(std::span<const Output> outputs) {
+/// Returns true if cells are written, and nothing that needs the cage.
+bool writes_cells_without_cage(std::span<const Output> outputs) {
   return std::ranges::any_of(outputs, [](const Output& output) { return output.is_volume(); }) &&
          std::ranges::none_of(
              outputs, [](const Output& output) { return output.part == Part::cage || output.part == Part::animation; });
@@ -53,10 +53,16 @@ class SubdivisionFitRun : public CageRun {
   Json report() const;
   void summarize() const;
   bool has_cage() const { return result_.cage.num_cells() > 0; }
-  bool frees_mesh() const { return arguments_.fit.frees_mesh && asks_for_cells_alone(outputs_); }
+  /// Returns true if the mesh may be freed from its cage, as far as that is known without the template.
+  bool frees_mesh() const {
+    const FitOptions& fit = arguments_.fit;
+    return fit.frees_mesh && fit.quality > 0 && !fit.keeps_groups && !is_cloud(target_) &&
+           writes_cells_without_cage(outputs_);
+  }
   /// Returns what a resumed run must have in common with this one, but for its options and its template.
   std::vector<std::pair<std::string, std::string>> identity_of_target() const {
-    return {{"target", fingerprint(target_)}, {"result", frees_mesh() ? "mesh" : "cage"}};
+    return {{"target", fingerprint(target_)},
+            {"outputs", frees_mesh() ? "cells without their cage" : "such as keep a cage"}};
   }
 
   const SubdivisionFitArguments& arguments_;
@@ -125,7 +131,7 @@ void SubdivisionFitRun::fit() {
   });
   checkpointing_->finish(result_.report.warnings);
   constexpr std::size_t kFarMore = 2;  // times the cells asked for; templates have about as many as they should
-  if (arguments_.cells && result_.mesh.num_cells() > kFarMore * *arguments_.cells)
+  if (arguments_.cells && has_cage() && result_.mesh.num_cells() > kFarMore * *arguments_.cells)
     result_.report.warnings.push_back(internal::formatted(
         "the result has %zu cells, though %zu were asked for: its template has %zu, and --levels %d subdivides "
         "these; ask for fewer levels",

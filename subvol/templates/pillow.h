@@ -19,8 +19,10 @@ namespace subvol {
 ///        |   |   |            |/ \|/ \|
 ///        o---o---o            o---o---o
 ///
-/// mesh    passes `validate` except for unused vertices.
+/// mesh    passes `validate` except for unused vertices, and inverted cells if these are allowed.
 /// cells   numbers of the cells of the set, each once; empty: all cells.
+/// inverted  allowed: cells around a vertex at which no step keeps all of them valid are left inverted, for
+///           `optimize_mesh` to untangle. refused: that is an InputError.
 /// returns the old cells, those of the set on new vertices, then one cell per face of the set's boundary, ordered by
 /// cell and local face. Old vertices keep their numbers and positions; new vertices are appended. A new cell gets the
 /// reference of its neighbor in the set. Tags and groups of faces stay on the set's boundary and outside it, and move
@@ -32,7 +34,8 @@ namespace subvol {
 /// be inverted if some direction sees all boundary faces around the vertex from their front (`VertexRule::pillowable`).
 ///
 /// InputError: an invalid mesh; a cell number out of range or given twice; a set whose boundary is not a manifold (it
-/// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.
+/// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid, if inverted ones are
+/// refused.
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {},
                   InvertedCells inverted = InvertedCells::refused);
 

@@ -59,17 +59,36 @@ TEST_CASE("A mesh that must keep its cage is not freed") {
 TEST_CASE("A fit that frees its mesh reports progress that never falls, and can be cancelled", "[slow]") {
   const auto [name, torus, carved] = carved_torus_sample();
   double last = 0;
-  bool falls = false, is_freeing = false;
+  bool falls = false, cancels = false;
   FitOptions options{.levels = 1, .frees_mesh = true};
   options.control.progress = [&](const FitProgress& progress) {
     falls = falls || progress.fraction < last;
     last = progress.fraction;
-    is_freeing = progress.fraction > 1 - kShareOfFreeing;
-    return !is_freeing;
+    return !(cancels && progress.fraction > 1 - kShareOfFreeing);
   };
-  const FitResult fit = fit_subdivision_volume(torus, carved, options);
-  CHECK(is_freeing);
+  CHECK(fit_subdivision_volume(torus, carved, options).cage.num_cells() == 0);
   CHECK_FALSE(falls);
-  CHECK(fit.report.stop_reason == StopReason::cancelled);
-  CHECK(check_mesh(fit.mesh).valid());
+  CHECK(last > 0.9);
+  cancels = true;
+  const FitResult cancelled = fit_subdivision_volume(torus, carved, options);
+  CHECK(cancelled.report.stop_reason == StopReason::cancelled);
+  CHECK(check_mesh(cancelled.mesh).valid());
+}
+
+TEST_CASE("A template far off its target is fitted as before", "[slow]") {
+  auto [name, torus, carved] = carved_torus_sample();
+  for (Vec3& p : carved.positions) p = 25 * p + Vec3(30, 0, 0);
+  FitOptions options{.levels = 1, .frees_mesh = true};
+  options.control.max_iterations = 1;
+  CHECK(fit_subdivision_volume(torus, carved, options).mesh.num_cells() > 0);
+}
+
+TEST_CASE("A freed mesh has sharp edges only if they are asked for", "[slow]") {
+  const samples::Sample bracket = samples::bracket_sample();
+  VolumeMesh smooth = bracket.template_mesh;
+  smooth.tags = {};
+  FitOptions options{.levels = 1, .quality = 0.8, .frees_mesh = true};
+  CHECK_FALSE(fit_subdivision_volume(bracket.target, smooth, options).report.creases);
+  options.crease_angle_degrees = 40;
+  CHECK(fit_subdivision_volume(bracket.target, smooth, options).report.creases);
 }

@@ -55,6 +55,11 @@ class Fits(InFolder):
         self.assertNotIn("cage", freed.report)
         subvol.write("again.mesh", freed)
         self.assert_same_file("freed.mesh", "again.mesh")
+        subvol.write("freed.glb", freed)
+        with self.assertRaisesRegex(ValueError, "cage"):
+            subvol.write("cage:freed_cage.mesh", freed)
+        with self.assertRaisesRegex(ValueError, "keep_cage=False"):
+            subvol.fit(*BALL, levels=1, keep_cage=False, cage_only=True)
         kept = subvol.fit("torus_target.off", "carved.mesh", levels=1)
         self.assertGreater(freed.report["quality"]["min_scaled_jacobian"],
                            2 * kept.report["quality"]["min_scaled_jacobian"])
