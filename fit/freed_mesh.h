@@ -11,8 +11,9 @@ namespace subvol::internal {
 /// Share of the work that a fit leaves to `free_mesh`.
 inline constexpr double kShareOfFreeing = 0.4;
 
-/// Returns true if the mesh of a fit may be freed from its cage: the template has one region, whose volume cannot
-/// change against that of another, and borders between groups, which freed vertices do not follow, need not be kept.
+/// Returns true if the mesh of a fit may be freed from its cage: a quality is aimed at, the template has one region,
+/// whose volume cannot change against that of another, and borders between groups, which freed vertices do not follow,
+/// need not be kept.
 bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 
 /// Raises the quality of a fit's finest mesh beyond what its cage allows. The cage has an eighth of the mesh's vertices,
