@@ -40,6 +40,9 @@ constexpr double kNoCreaseAngle = 180;
 struct FreedState {
   double least_jacobian, mean_percent, max_percent;
   std::size_t uncertified, pairs;
+
+  bool is_valid() const { return uncertified == 0 && pairs == 0; }
+  bool operator==(const FreedState&) const = default;
 };
 
 /// The state of a fit's mesh, and what replaces it.
@@ -85,19 +88,20 @@ bool MeshFreeing::is_too_far(const FreedState& now) const {
          now.mean_percent > kMostRise * start_.mean_percent || now.max_percent > kMostRise * start_.max_percent;
 }
 
+/// Returns true if a state is better than the best one: validity counts first, then the least scaled Jacobian.
 bool MeshFreeing::gains(const FreedState& now) const {
-  return now.least_jacobian > best_.least_jacobian && now.uncertified <= best_.uncertified &&
-         now.pairs <= best_.pairs && !is_too_far(now);
+  if (is_too_far(now) || now.uncertified > best_.uncertified || now.pairs > best_.pairs) return false;
+  return now.uncertified < best_.uncertified || now.pairs < best_.pairs || now.least_jacobian > best_.least_jacobian;
 }
 
 /// Optimizes a mesh with all of its vertices and keeps it if it is better. Returns false if the work must end.
 bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
   const double middle = (begin + end) / 2;
   const std::size_t first = result_.report.stages.size();
-  const double before = best_.least_jacobian;
+  const FreedState before = best_;
   std::optional<FreedState> now = optimize(mesh, kMostRise, part_of_work(options_.control, begin, middle));
   if (now && is_too_far(*now)) now = optimize(mesh, kNearerShare, part_of_work(options_.control, middle, end));
-  if (best_.least_jacobian == before) result_.report.undo_stages(first, result_.report.stages.size());
+  if (best_ == before) result_.report.undo_stages(first, result_.report.stages.size());
   return now.has_value();
 }
 
@@ -167,7 +171,8 @@ void MeshFreeing::try_to_free(const VolumeMesh& lifted) {
                          measure_quality(lifted).min_scaled_jacobian > start_.least_jacobian;
   const VolumeMesh& start = is_lifted ? lifted : result_.mesh;
   try {
-    if (!attempt(start, begin, middle) || best_.least_jacobian >= kLayerBelow * options_.quality) return;
+    if (!attempt(start, begin, middle)) return;
+    if (best_.is_valid() && best_.least_jacobian >= kLayerBelow * options_.quality) return;
     attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), middle, 1);
   } catch (const std::bad_alloc&) {
     result_.report.stop_reason = StopReason::memory_limit;

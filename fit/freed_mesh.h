@@ -20,12 +20,13 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 /// and its template may have smooth edges with one cell, which becomes flat there.
 ///
 /// 1. All vertices of the mesh become degrees of freedom (`optimize_mesh`), from the state with the better cells.
-/// 2. If the least scaled Jacobian is still below three quarters of the quality, a layer of cells is put inside the
-///    boundary (`pillow`), and the vertices of that mesh are moved in the same way.
+/// 2. If the least scaled Jacobian is still below three quarters of the quality, or the mesh is not valid, a layer of
+///    cells is put inside the boundary (`pillow`), and the vertices of that mesh are moved in the same way.
 ///
-/// Each result is kept if its least scaled Jacobian is higher, no more cells lack a certificate, no more triangles of
-/// the boundary intersect, and the distances from the target are at most 5 % larger than those of the cage's mesh, and
-/// within the tolerance if they were. If one is kept, `result.mesh` is that mesh, without a cage and without states.
+/// Each result is kept if no more cells lack a certificate and no more triangles of the boundary intersect, if one of
+/// these numbers is lower or the least scaled Jacobian higher, and if the distances from the target are at most 5 %
+/// larger than those of the cage's mesh, and within the tolerance if they were. If one is kept, `result.mesh` is that
+/// mesh, without a cage and without states.
 ///
 /// target   what the fit's mesh reproduces.
 /// options  of the fit; the time limit is what is left of it.

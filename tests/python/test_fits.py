@@ -263,7 +263,7 @@ class States(InFolder):
             subvol.write("cutaway:none.glb", fit, cut="w")
 
     def test_the_energy_is_the_programs(self):
-        fit = subvol.fit(*BALL, levels=1, energy="inverse_mean_ratio")
+        fit = subvol.fit(*BALL, levels=1, energy="inverse_mean_ratio", keep_cage=False)
         subvol.write("python.mesh", fit)
         self.run_program("fit", BALL[0], "--template", BALL[1], "--levels", "1", "--energy", "inverse_mean_ratio",
                          "-o", "program.mesh")
