@@ -34,9 +34,9 @@ constexpr double kNearerShare = 0.7;
 /// Largest distance from the target, in percent of its diagonal, at which a mesh is freed: one farther off is not in
 /// place.
 constexpr double kMostFreedPercent = 50;
-constexpr double kNoCreaseAngle = 180;
+constexpr double kNoCreaseAngle = 180;  // no edge is sharper
 
-/// What decides between two meshes of one target.
+/// Holds the measures that decide which of two meshes of one target is better.
 struct FreedState {
   double least_jacobian, mean_percent, max_percent;
   std::size_t uncertified, pairs;
@@ -45,7 +45,7 @@ struct FreedState {
   bool operator==(const FreedState&) const = default;
 };
 
-/// The state of a fit's mesh, and what replaces it.
+/// Frees the mesh of one fit: makes the attempts, and puts the best mesh in the place of the fit's.
 class MeshFreeing {
  public:
   MeshFreeing(const TriangleMesh& target, const FitOptions& options, FitResult& result)

@@ -62,7 +62,7 @@ class SubdivisionFitRun : public CageRun {
   /// Returns what a resumed run must have in common with this one, but for its options and its template.
   std::vector<std::pair<std::string, std::string>> identity_of_target() const {
     return {{"target", fingerprint(target_)},
-            {"outputs", frees_mesh() ? "cells without their cage" : "such as keep a cage"}};
+            {"outputs", frees_mesh() ? "cells without a cage" : "a cage, or a scene without cells"}};
   }
 
   const SubdivisionFitArguments& arguments_;

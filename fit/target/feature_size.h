@@ -50,8 +50,9 @@ struct FeatureMiss {
 /// Returns the distance from each point of features to a fitted surface. InputError: as `ClosestPoint::closest`.
 std::vector<double> feature_distances(const FeatureSizes& features, const ClosestPoint& fitted);
 
-/// Returns the largest of these distances as a share of the size there, among the points of features of at least a
-/// given size; nothing if there are none.
+/// Returns the largest distance as a share of the size there, among the points of features of at least `least_size`;
+/// nothing if there are none.
+/// distances  one for each point of the features, in their order, in the unit of their sizes.
 std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, std::span<const double> distances,
                                                 double least_size = 0);
 

@@ -147,6 +147,7 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
   }
 }
 
+/// Throws InputError if a cell is inverted.
 /// origins  numbers of all vertices for the message.
 void require_upright(const VolumeMesh& mesh, std::span<const Index> origins) {
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)

@@ -90,8 +90,8 @@ TEST_CASE("A fit that writes cells and no cage frees poor ones from the cage, an
   };
   CHECK(least(freed) > 0.5);
   CHECK(least(kept) < 0.3);
-  for (const char* scenes : {"-o cage:cage.mesh", "--surface limit", "--cage-only", "-o animation:a.html"})
-    CHECK(fitted(scenes).contains("cage"));
+  for (const char* need : {"-o cage:cage.mesh", "--surface limit", "--cage-only", "-o animation:a.html"})
+    CHECK(fitted(need).contains("cage"));
   CHECK(place.run(kFit + "--levels 1 --force -o out.glb --report r.json").status == 0);
   CHECK(place.json("r.json").contains("cage"));  // a scene shows the limit surface
 }
