@@ -11,9 +11,11 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/templates/pillow.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <new>
 #include <optional>
@@ -34,32 +36,30 @@ constexpr double kNearerShare = 0.7;
 /// Largest distance from the target, in percent of its diagonal, at which a mesh is freed: one farther off is not in
 /// place.
 constexpr double kMostFreedPercent = 50;
+/// Mean distance, in sizes of a boundary face, at which a freed mesh counts as the finest level that its cage could not
+/// reach. Balls and tori of 50 to 4,000 cells have 0.02 to 0.08.
+constexpr double kReachedShare = 0.1;
 constexpr double kNoCreaseAngle = 180;  // no edge is sharper
-
-/// Holds the measures that decide which of two meshes of one target is better.
-struct FreedState {
-  double least_jacobian, mean_percent, max_percent;
-  std::size_t uncertified, pairs;
-
-  bool is_valid() const { return uncertified == 0 && pairs == 0; }
-  bool operator==(const FreedState&) const = default;
-};
 
 /// Frees the mesh of one fit: makes the attempts, and puts the best mesh in the place of the fit's.
 class MeshFreeing {
  public:
   MeshFreeing(const TriangleMesh& target, const FitOptions& options, FitResult& result)
-      : target_(target), options_(options), result_(result), runner_(options.control), start_(measured(result.mesh)) {
+      : target_(target),
+        options_(options),
+        result_(result),
+        runner_(options.control),
+        start_(measure_state(result.mesh, target)) {
     best_ = start_;
   }
   void run(const VolumeMesh& lifted);
 
  private:
-  FreedState measured(const VolumeMesh& mesh) const;
-  bool is_too_far(const FreedState& now) const;
-  bool gains(const FreedState& now) const;
+  bool is_too_far(const MeshState& now) const;
+  bool reaches_the_finest_level() const;
+  bool gains(const MeshState& now) const;
   bool attempt(VolumeMesh mesh, double begin, double end);
-  std::optional<FreedState> optimize(VolumeMesh& mesh, double distance_share, SolveControl control);
+  std::optional<MeshState> optimize(VolumeMesh& mesh, double distance_share, SolveControl control);
   void try_to_free(const VolumeMesh& lifted);
   void conclude();
 
@@ -67,29 +67,20 @@ class MeshFreeing {
   const FitOptions& options_;
   FitResult& result_;
   StageRunner runner_;  ///< its clock began with the freeing
-  FreedState start_, best_;
+  MeshState start_, best_;
   std::optional<VolumeMesh> freed_;
   FitReport found_;  ///< of freed_
 };
 
-FreedState MeshFreeing::measured(const VolumeMesh& mesh) const {
-  const QualityReport quality = measure_quality(mesh);
-  const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
-  const SurfaceDistance distance = surface_distance(surface, target_);
-  const double to_percent = 100 / bounding_box_diagonal(target_);
-  return {quality.min_scaled_jacobian, to_percent * distance.mean(), to_percent * distance.max(),
-          quality.certificate.not_certified.size(), count_intersecting_pairs(surface)};
-}
-
 /// Returns true if a state is too far from the target.
-bool MeshFreeing::is_too_far(const FreedState& now) const {
+bool MeshFreeing::is_too_far(const MeshState& now) const {
   const std::optional<double>& tolerance = options_.tolerance_percent;
   return (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) ||
-         now.mean_percent > kMostRise * start_.mean_percent || now.max_percent > kMostRise * start_.max_percent;
+         now.is_farther_than(start_);
 }
 
 /// Returns true if a state is better than the best one: validity counts first, then the least scaled Jacobian.
-bool MeshFreeing::gains(const FreedState& now) const {
+bool MeshFreeing::gains(const MeshState& now) const {
   if (is_too_far(now) || now.uncertified > best_.uncertified || now.pairs > best_.pairs) return false;
   return now.uncertified < best_.uncertified || now.pairs < best_.pairs || now.least_jacobian > best_.least_jacobian;
 }
@@ -98,8 +89,8 @@ bool MeshFreeing::gains(const FreedState& now) const {
 bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
   const double middle = (begin + end) / 2;
   const std::size_t first = result_.report.stages.size();
-  const FreedState before = best_;
-  std::optional<FreedState> now = optimize(mesh, kMostRise, part_of_work(options_.control, begin, middle));
+  const MeshState before = best_;
+  std::optional<MeshState> now = optimize(mesh, kMostRise, part_of_work(options_.control, begin, middle));
   if (now && is_too_far(*now)) now = optimize(mesh, kNearerShare, part_of_work(options_.control, middle, end));
   if (best_ == before) result_.report.undo_stages(first, result_.report.stages.size());
   return now.has_value();
@@ -107,7 +98,7 @@ bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
 
 /// Optimizes a mesh within a share of the cage's distances, and keeps it if it is better. Returns its new state, or
 /// nothing if the work must end.
-std::optional<FreedState> MeshFreeing::optimize(VolumeMesh& mesh, double distance_share, SolveControl control) {
+std::optional<MeshState> MeshFreeing::optimize(VolumeMesh& mesh, double distance_share, SolveControl control) {
   constexpr double kLeastTolerance = 1e-6, kMostTolerance = 100;  // percent
   constexpr double kLeastSeconds = 1e-3;
   if (!runner_.in_time("the freeing of the mesh", result_.report)) return std::nullopt;
@@ -130,18 +121,24 @@ std::optional<FreedState> MeshFreeing::optimize(VolumeMesh& mesh, double distanc
     stage.name = "vertices freed, " + stage.name;
     result_.report.stages.push_back(std::move(stage));
   }
-  const bool ended_early = report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::cancelled;
-  if (ended_early) {
+  const bool ended = ended_early(report.stop_reason);
+  if (ended) {
     result_.report.stop_reason = report.stop_reason;
     result_.report.explanation = report.explanation;
   }
-  const FreedState now = measured(mesh);
+  const MeshState now = measure_state(mesh, target_);
   if (gains(now)) {
     best_ = now;
     freed_ = mesh;
     found_ = std::move(report);
   }
-  return ended_early ? std::nullopt : std::optional(now);
+  return ended ? std::nullopt : std::optional(now);
+}
+
+/// Returns true if the finest level, which the cage could not reach, is reached by the freed mesh.
+bool MeshFreeing::reaches_the_finest_level() const {
+  return result_.report.stop_reason == StopReason::stalled && result_.level == options_.levels && best_.is_valid() &&
+         best_.mean_percent <= kReachedShare * best_.face_percent;
 }
 
 /// Makes the best mesh the result, if it is not the cage's.
@@ -150,7 +147,7 @@ void MeshFreeing::conclude() {
   FitReport& report = result_.report;
   const std::size_t layer = freed_->num_cells() - result_.mesh.num_cells();
   const StopReason reason = report.stop_reason;
-  if (reason == StopReason::converged || reason == StopReason::tolerance_missed)
+  if (reason == StopReason::converged || reason == StopReason::tolerance_missed || reaches_the_finest_level())
     conclude_by_distance(best_.mean_percent, options_.tolerance_percent, report);
   report.explanation += "; all vertices were freed from the cage";
   if (layer > 0) report.explanation += formatted(", with a layer of %zu cells inside the boundary", layer);
@@ -166,14 +163,13 @@ void MeshFreeing::conclude() {
 /// Makes the attempts. If memory runs out in one, what was kept before stays.
 void MeshFreeing::try_to_free(const VolumeMesh& lifted) {
   constexpr double kFirst = 0.5;  // share of the work in the first attempt
-  const double begin = 1 - kShareOfFreeing, middle = begin + kFirst * kShareOfFreeing;
   const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells() &&
                          measure_quality(lifted).min_scaled_jacobian > start_.least_jacobian;
   const VolumeMesh& start = is_lifted ? lifted : result_.mesh;
   try {
-    if (!attempt(start, begin, middle)) return;
+    if (!attempt(start, 0, kFirst)) return;
     if (best_.is_valid() && best_.least_jacobian >= kLayerBelow * options_.quality) return;
-    attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), middle, 1);
+    attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), kFirst, 1);
   } catch (const std::bad_alloc&) {
     result_.report.stop_reason = StopReason::memory_limit;
     result_.report.explanation = "no memory was left to free the mesh from its cage";
@@ -189,13 +185,33 @@ void MeshFreeing::run(const VolumeMesh& lifted) {
 
 }  // namespace
 
+bool MeshState::is_farther_than(const MeshState& other) const {
+  return mean_percent > kMostRise * other.mean_percent || max_percent > kMostRise * other.max_percent;
+}
+
+MeshState measure_state(const VolumeMesh& mesh, const TriangleMesh& target) {
+  const QualityReport quality = measure_quality(mesh);
+  const MeshTopology topology(mesh);
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh, topology));
+  const SurfaceDistance distance = surface_distance(surface, target);
+  const double to_percent = 100 / bounding_box_diagonal(target);
+  double area = 0;
+  for (const auto& triangle : surface.triangles) area += triangle_area(surface, triangle);
+  const double faces = static_cast<double>(topology.boundary_faces().size());
+  return {quality.min_scaled_jacobian,
+          to_percent * distance.mean(),
+          to_percent * distance.max(),
+          to_percent * std::sqrt(area / faces),
+          quality.certificate.not_certified.size(),
+          count_intersecting_pairs(surface)};
+}
+
 bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options) {
   return options.quality > 0 && !options.keeps_groups && region_references(template_mesh).size() <= 1;
 }
 
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result) {
-  const StopReason reason = result.report.stop_reason;
-  if (reason == StopReason::time_limit || reason == StopReason::cancelled || reason == StopReason::memory_limit) return;
+  if (ended_early(result.report.stop_reason)) return;
   MeshFreeing(target, options, result).run(lifted);
 }
 

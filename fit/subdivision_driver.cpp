@@ -46,11 +46,13 @@ void check_options(const FitOptions& options) {
 
 }  // namespace
 
-SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
+SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options,
+                                     int levels_before)
     : StagedFit(options.keep_states),
       options_((check_options(options), options)),
       target_(std::move(target)),
       template_(template_mesh),
+      levels_before_(levels_before),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
       runner_(options.control, options.solver) {
   require_valid(template_mesh, "template mesh");
@@ -121,7 +123,7 @@ bool SubdivisionDriver::fit_all_samples() {
 }
 
 std::string SubdivisionDriver::stage_name(const Stage& stage) const {
-  return formatted("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
+  return formatted("level %d, lambda %g, tangential weight %g", level(), stage.lambda, stage.tangential_weight);
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionDriver::surface_term(const Stage& stage) const {
@@ -138,7 +140,7 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
   if (!runner_.in_time(name, result_.report)) return false;
   StageRecord record;
   record.name = try_ == 1 ? name : formatted("try %d, ", try_) + name;
-  record.level = number_;
+  record.level = level();
   record.cells = level_.mesh.num_cells();
   keep_state();
   lambda_ = stage.lambda;
@@ -187,13 +189,13 @@ bool SubdivisionDriver::start_level() {
     if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
     if (t == 1) return true;
-    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda)))
+    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", level(), t, stage.lambda)))
       return false;
   }
   level_.nodes = blend(level_.safe_nodes, nodes, t);
   result_.report.stop_reason = StopReason::stalled;
   result_.report.explanation =
-      formatted("level %d could not be reached without inverting a cell (%.0f %% of the way)", number_, 100 * t);
+      formatted("level %d could not be reached without inverting a cell (%.0f %% of the way)", level(), 100 * t);
   return false;
 }
 
@@ -307,8 +309,8 @@ bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
                        target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
   stages.before_stage = [this] { keep_state(); };
   StageRecord record;
-  record.name = formatted("level %d, quality", number_);
-  record.level = number_;
+  record.name = formatted("level %d, quality", level());
+  record.level = level();
   record.cells = level_.mesh.num_cells();
   const double begin = runner_.seconds();
   const bool going = stages.run(schedule, runner_, record, unknowns_, result_.report);
@@ -319,7 +321,7 @@ bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
 
 /// Stores the whole state or nothing, since memory may run out here.
 void SubdivisionDriver::store_result() {
-  FitResult stored{cage_, level_.mesh, {}, states_};
+  FitResult stored{cage_, level_.mesh, {}, states_, level()};
   stored.cage.positions = target_.normalization.from_unit(unknowns_);
   stored.mesh.positions = target_.normalization.from_unit(level_.nodes.apply(unknowns_));
   for (FitState& state : stored.states) state.positions = target_.normalization.from_unit(std::move(state.positions));
@@ -332,6 +334,7 @@ void SubdivisionDriver::store_result() {
   result_.cage = std::move(stored.cage);
   result_.mesh = std::move(stored.mesh);
   result_.states = std::move(stored.states);
+  result_.level = stored.level;
   result_stages_ = {try_begin_, result_.report.stages.size()};
 }
 
@@ -373,7 +376,7 @@ bool SubdivisionDriver::end_for_memory(const std::string& why) {
 bool SubdivisionDriver::has_room() {
   std::size_t cells = 0;
   for (const CellKind kind : control_.kinds) cells += static_cast<std::size_t>(cell_topology(kind).num_vertices);
-  return memory_.allows(cells) || end_for_memory(memory_.refusal(formatted("level %d of %zu cells", number_, cells)));
+  return memory_.allows(cells) || end_for_memory(memory_.refusal(formatted("level %d of %zu cells", level(), cells)));
 }
 
 }  // namespace subvol::internal

@@ -47,7 +47,8 @@ class SubdivisionDriver : protected StagedFit {
   };
 
   /// InputError: options out of range; the template has defects.
-  SubdivisionDriver(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options);
+  /// levels_before  number of levels of the fit whose mesh is the template.
+  SubdivisionDriver(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options, int levels_before);
   ~SubdivisionDriver() = default;
 
   /// Records the template's audit and its initial distance in the report, and makes the schedule.
@@ -78,6 +79,8 @@ class SubdivisionDriver : protected StagedFit {
   /// past_limit  the state is measured although the time limit has been reached.
   std::optional<Measured> measure(bool past_limit = false);
   bool finest() const { return number_ == options_.levels; }
+  /// Returns the level of the finite element mesh as reports count it.
+  int level() const { return levels_before_ + number_; }
   std::vector<Vec3>& unknowns() override { return unknowns_; }
   FitReport& report() override { return result_.report; }
 
@@ -86,9 +89,10 @@ class SubdivisionDriver : protected StagedFit {
   VolumeMesh template_;  ///< normalized, with its creases
   VolumeMesh cage_;      ///< the mesh whose vertices are the degrees of freedom
   std::vector<Vec3> unknowns_;
+  int levels_before_ = 0;
   int try_ = 0;  ///< number of attempts begun, each with other ideal cells
   FitSchedule schedule_;
-  int number_ = 0;  ///< level of the finite element mesh
+  int number_ = 0;  ///< level of the finite element mesh, from 1 in each attempt
   FitLevel level_;
   FitResult result_;
   StageRange result_stages_;  ///< the stages that led to the state stored in result_

@@ -3,19 +3,15 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/cage_fit.h"
 #include "subvol/fit/energies/make_surface_term.h"
-#include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/freed_mesh.h"
-#include "subvol/fit/subdivision_driver.h"
+#include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/target/region_matching.h"
 #include "subvol/subdivision/audit.h"
 
 #include <algorithm>
-#include <array>
-#include <functional>
-#include <new>
-#include <optional>
-#include <span>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,259 +22,123 @@ using namespace internal;
 
 namespace {
 
-/// The recursive fit: its sequence of levels and stages, and what raises the quality of the finest mesh.
-class SubdivisionFit : SubdivisionDriver {
- public:
-  SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
-      : SubdivisionDriver(std::move(target), template_mesh, options) {}
-  FitResult run();
-  /// Returns the finest mesh with lifted cells, if the surface suffered too much for the cage: its vertices, once free,
-  /// find back. Without cells if there is none.
-  VolumeMesh take_lifted_mesh() { return std::move(lifted_mesh_); }
-
- private:
-  bool run_levels();
-  bool run_level();
-  bool run_stages();
-  bool improve_finest(const FitSnapshot& start);
-  bool lower_lambda(std::size_t pairs);
-  bool raise_quality();
-  bool flatten_interfaces();
-
-  VolumeMesh lifted_mesh_;  ///< of the attempt with the best cells
-  double lifted_jacobian_ = 0;
-};
-
-/// Repeats the finest level with less and less weight on the cells' shape, until the wanted accuracy is reached.
-/// Without a tolerance, it also ends if a stage costs more (relative rise of E_W) than it gains (relative decrease of
-/// the mean distance). A stage is rolled back if it is interrupted, if it leaves more than `pairs` self-intersections
-/// of the boundary, or, without a tolerance, if the total loss of shape is too large.
-bool SubdivisionFit::lower_lambda(std::size_t pairs) {
-  const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
-  const double least =
-      options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
-  const auto distortion = [this] {
-    const StageRecord* stage = result_.report.last_kept_stage();
-    return !stage || stage->iterations.empty() ? 0 : stage->iterations.back().volume_energy;
-  };
-  double mean = measured_mean(), volume = distortion();
-  const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
-  for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
-    FitSnapshot stiffer = snapshot();
-    if (!run_final_stage(lambda)) {
-      go_back(std::move(stiffer));
-      return false;
-    }
-    const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
-    const double loss = shape - mean_scaled_jacobian();
-    const std::optional<std::size_t> pairs_now = intersecting_pairs();
-    if (!pairs_now || *pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
-      go_back(std::move(stiffer));
-      return pairs_now.has_value();
-    }
-    mean = measured_mean();
-    volume = distortion();
-    pairs = *pairs_now;
-    if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
-  }
-  return true;
-}
-
-/// An attempt to raise the quality of the finest mesh: a lift from the state before, or all quality stages from the
-/// state of the last attempt, which draw the surface back.
-struct QualityAttempt {
-  enum class Kind { lift, draw_back };
-  Kind kind;
-  double surface;      ///< factor of the surface's weight
-  bool worst_patches;  ///< `QualitySchedule::lifts_worst_of_cage`
-};
-
-/// The attempts, which are made in this order until the quality has risen and the distances have not suffered. A cage
-/// has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free, and counts
-/// more here. First the cells are lifted. Then the surface is drawn back with more and more weight, while the hinge
-/// keeps the cells as they are: femur180 at level 2 rises from 0.008 to 0.60 by the lift, but is 8 % farther from the
-/// target then; drawn back, it has 0.53 and is 4 % farther. If none of this has gained, the same is done around the
-/// worst cells alone.
-constexpr std::array<QualityAttempt, 9> kQualityAttempts{{{QualityAttempt::Kind::lift, 10, false},
-                                                          {QualityAttempt::Kind::draw_back, 100, false},
-                                                          {QualityAttempt::Kind::draw_back, 300, false},
-                                                          {QualityAttempt::Kind::draw_back, 1000, false},
-                                                          {QualityAttempt::Kind::draw_back, 10000, false},
-                                                          {QualityAttempt::Kind::lift, 10, true},
-                                                          {QualityAttempt::Kind::draw_back, 100, true},
-                                                          {QualityAttempt::Kind::draw_back, 1000, true},
-                                                          {QualityAttempt::Kind::draw_back, 10000, true}}};
-/// Number of attempts that are made if the mesh may be freed from the cage afterwards.
-constexpr std::size_t kAttemptsBeforeFreeing = 2;
-/// Steps of the lift when the surface is drawn back: the cells have been lifted before.
-constexpr int kLaterLiftSteps = 20;
-
-/// Raises the lowest scaled Jacobians of the finest mesh as far as the distances do not suffer, or rolls back. Returns
-/// false if the fit must end.
-bool SubdivisionFit::raise_quality() {
-  constexpr double kEnoughOfGoal = 0.75;  // a gain to this share of the quality aimed at ends the attempts
-  constexpr double kPoorShare = 0.5;      // the surface is drawn back only if the quality was below this share
-  const StageRecord* last = result_.report.last_kept_stage();
-  if (options_.quality == 0 || (last && last->ended == MinimizerStop::infeasible_start)) return true;
-  const std::optional<Measured> before = measure();
-  if (!before) return false;
-  if (before->least_jacobian >= options_.quality) return true;
-  runner_.work().begin_part(1, late_quality_schedule(options_.quality).expected_steps());
-  FitSnapshot best = snapshot();
-  double best_jacobian = before->least_jacobian;
-  const bool is_poor = before->least_jacobian < kPoorShare * options_.quality;
-  bool is_lifted = false;
-  const auto attempts =
-      std::span(kQualityAttempts).first(options_.frees_mesh ? kAttemptsBeforeFreeing : kQualityAttempts.size());
-  for (const QualityAttempt& attempt : attempts) {
-    const bool has_gained = best_jacobian > before->least_jacobian;
-    const bool is_lift = attempt.kind == QualityAttempt::Kind::lift;
-    if (has_gained && (is_lift || best_jacobian >= kEnoughOfGoal * options_.quality)) break;
-    if (!is_lift && !(is_poor && is_lifted)) continue;
-    if (is_lift) go_back(best);
-    QualitySchedule schedule =
-        is_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
-    schedule.most_distance = (is_lift ? 1 : kMaxMargin) * before->largest();
-    schedule.give_surface_more_weight(attempt.surface);
-    schedule.lifts_worst_of_cage = attempt.worst_patches;
-    if (!is_lift) schedule.lift.steps = std::min(schedule.lift.steps, kLaterLiftSteps);
-    const bool going = or_back(best, [&] { return run_quality_stages(schedule); });
-    std::optional<Measured> now = going ? measure() : std::nullopt;
-    if (!now) {
-      if (result_.report.stop_reason == StopReason::time_limit) now = measure(true);
-      const bool gains = now && now->gains_on(*before, options_.tolerance_percent);
-      if (!gains || now->least_jacobian <= best_jacobian) go_back(std::move(best));
-      return false;
-    }
-    is_lifted = now->least_jacobian > before->least_jacobian;
-    if (options_.frees_mesh && now->least_jacobian > std::max(lifted_jacobian_, before->least_jacobian)) {
-      lifted_jacobian_ = now->least_jacobian;
-      lifted_mesh_ = current_mesh();
-      lifted_mesh_.positions = target_.normalization.from_unit(std::move(lifted_mesh_.positions));
-    }
-    if (!now->gains_on(*before, options_.tolerance_percent)) continue;
-    if (now->least_jacobian <= best_jacobian) break;  // more weight of the surface would not help
-    best_jacobian = now->least_jacobian;
-    best = snapshot();
-  }
-  go_back(std::move(best));
-  return true;
-}
-
-/// Makes flat interfaces exactly so, unless the cells suffer. Returns false if the fit must end.
-bool SubdivisionFit::flatten_interfaces() {
-  constexpr double kLeastShare = 0.98;  // of the least scaled Jacobian
-  if (!target_.has_interfaces()) return true;
-  const std::optional<Measured> before = measure();
-  if (!before) return false;
-  FitSnapshot start = snapshot();
-  VolumeMesh cage = cage_;
-  cage.positions = unknowns_;
-  if (flatten_interface_patches(cage, target_) == 0) return true;
-  unknowns_ = std::move(cage.positions);
-  mean_.reset();
-  const std::optional<Measured> now = measure();
-  if (now && now->uncertified <= before->uncertified && now->pairs <= before->pairs &&
-      now->least_jacobian >= kLeastShare * before->least_jacobian)
-    return true;
-  go_back(std::move(start));
-  return now.has_value();
-}
-
-bool SubdivisionFit::run_stages() {
-  const FitSnapshot start = snapshot();
-  for (const Stage& stage : schedule_.stages(number_)) {
-    if (!run_stage(stage)) return false;
-    if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;
-  }
-  if (!finest()) return true;
-  return improve_finest(start);
-}
-
-/// Improves the finest mesh step by step. If memory runs out, the state before the step is the result.
-/// start  of the level. Returns false if the fit must end.
-bool SubdivisionFit::improve_finest(const FitSnapshot& start) {
-  std::optional<std::size_t> pairs = intersecting_pairs();
-  if (!pairs) return false;
-  const std::array<std::function<bool()>, 5> steps{
-      [&] { return unfold(start, kMostUnfoldingLambda, *pairs); }, [&] { return lower_lambda(*pairs); },
-      [&] { return fit_all_samples(); }, [&] { return raise_quality(); }, [&] { return flatten_interfaces(); }};
-  for (const std::function<bool()>& step : steps) {
-    FitSnapshot before = snapshot();
-    try {
-      if (!or_back(before, step)) return false;
-    } catch (const std::bad_alloc&) {
-      result_.report.stop_reason = StopReason::memory_limit;
-      result_.report.explanation = formatted("no memory was left to improve level %d", number_);
-      return false;
-    }
-  }
-  return true;
-}
-
-bool SubdivisionFit::run_level() {
-  runner_.work().begin_part(schedule_.share_at_end(number_, options_.quality > 0), kExpectedLevelSteps);
-  prepare_level();
-  const bool going = start_level() && run_stages();
-  store_result();
-  return going;
-}
-
-/// Runs one attempt on all levels, with one choice of ideal cells. Returns false if it ended early.
-bool SubdivisionFit::run_levels() {
-  for (number_ = 1;; ++number_) {
-    if (!has_room() || (number_ > 1 && !runner_.in_time(formatted("level %d", number_), result_.report))) return false;
-    try {
-      if (!run_level()) return false;
-      if (finest() || meets_tolerance()) return true;
-      next_control();
-    } catch (const std::bad_alloc&) {
-      level_ = {};
-      return end_for_memory(formatted("no memory was left in level %d", number_));
-    }
-  }
-}
-
-FitResult SubdivisionFit::run() {
-  look_over_template();
-  bool done = false;
-  struct Stalled {
-    FitResult result;
-    StageRange stages;
-  };
-  std::optional<Stalled> best;  // the stalled attempt that reached the finest mesh
-  for (double share : schedule_.own_box_shares) {
-    begin(share);
-    done = run_levels();
-    if (done || result_.report.stop_reason != StopReason::stalled) break;
-    if (!best || result_.mesh.num_cells() > best->result.mesh.num_cells()) best = {result_, result_stages_};
-  }
-  const bool stalled = result_.report.stop_reason == StopReason::stalled;
-  if (best && !done && (stalled || best->result.mesh.num_cells() > result_.mesh.num_cells())) {
-    FitReport last = std::exchange(result_, std::move(best->result)).report;
-    result_stages_ = best->stages;
-    result_.report.stages = std::move(last.stages);
-    if (!stalled) {  // the fit was ended in a later attempt
-      result_.report.stop_reason = last.stop_reason;
-      result_.report.explanation = std::move(last.explanation);
-    }
-  }
-  FitReport& report = result_.report;
-  report.undo_stages(0, result_stages_.begin);
-  report.undo_stages(result_stages_.end, report.stages.size());
-  if (done) runner_.conclude(measured_mean(), options_.tolerance_percent, report);
-  report.seconds.assign(seconds_.begin(), seconds_.end());
-  return std::move(result_);
-}
-
-}  // namespace
-
-namespace {
-
 /// Drops warnings of a template that are not true of a mesh that was freed from its cage.
 void drop_warnings(const std::vector<std::string>& dropped, FitReport& report) {
   std::erase_if(report.warnings,
                 [&](const std::string& warning) { return std::ranges::find(dropped, warning) != dropped.end(); });
+}
+
+/// Adds seconds to those of the same part.
+void add_seconds(const std::vector<std::pair<std::string, double>>& added, FitReport& report) {
+  for (const auto& [part, seconds] : added) {
+    const auto same = std::ranges::find(report.seconds, part, &std::pair<std::string, double>::first);
+    if (same == report.seconds.end())
+      report.seconds.emplace_back(part, seconds);
+    else
+      same->second += seconds;
+  }
+}
+
+/// A fit whose finest mesh may be freed from its cage. If it stalls at a lower level, it goes on from the freed mesh of
+/// that level.
+class FreedFit {
+ public:
+  FreedFit(const TriangleMesh& target, const FitOptions& options)
+      : target_(target), options_(options), clock_(options.control) {}
+  FitResult run(const VolumeMesh& template_mesh);
+
+ private:
+  FitOptions part_until(double end);
+  FitResult fit_and_free(const VolumeMesh& template_mesh, int levels_before);
+  bool can_go_on(const FitResult& result) const;
+  bool is_kept(const FitResult& next, const FitResult& result) const;
+  void go_on(FitResult& result);
+
+  const TriangleMesh& target_;
+  const FitOptions& options_;
+  StageRunner clock_;
+  double done_ = 0;  ///< share of the work
+};
+
+/// Returns the options of the next part of the work.
+/// end  share of the work that is done after it.
+FitOptions FreedFit::part_until(double end) {
+  constexpr double kLeastSeconds = 1e-3;  // 0 is no limit
+  FitOptions part = options_;
+  if (options_.control.progress)
+    part.control.progress = [this, begin = done_, end](FitProgress progress) {
+      progress.fraction = done_ = begin + (end - begin) * std::clamp(progress.fraction, 0.0, 1.0);
+      return options_.control.progress(progress);
+    };
+  if (double& limit = part.control.time_limit_seconds; limit > 0)
+    limit = std::max(kLeastSeconds, limit - clock_.seconds());
+  return part;
+}
+
+/// Fits a template, and frees its mesh if that is good for the cells.
+/// levels_before  number of levels of the fit whose mesh is the template.
+FitResult FreedFit::fit_and_free(const VolumeMesh& template_mesh, int levels_before) {
+  constexpr double kShareIfStalled = 0.3;  // of the work that is left, if more levels follow
+  FitOptions options = part_until(1 - kShareOfFreeing * (1 - done_));
+  options.levels -= levels_before;
+  CageFit fit = fit_cage(FitTarget(target_), template_mesh, options, levels_before);
+  FitResult& result = fit.result;
+  if (options_.control.time_limit_seconds > 0 && !clock_.in_time("the freeing of the mesh", result.report))
+    return std::move(result);
+  const bool levels_follow = result.report.stop_reason == StopReason::stalled && result.level < options_.levels;
+  free_mesh(target_, part_until(levels_follow ? done_ + kShareIfStalled * (1 - done_) : 1), fit.lifted, result);
+  if (result.cage.num_cells() == 0) drop_warnings(audit(template_mesh).warnings, result.report);
+  return std::move(result);
+}
+
+bool FreedFit::can_go_on(const FitResult& result) const {
+  return result.report.stop_reason == StopReason::stalled && result.cage.num_cells() == 0 &&
+         result.level < options_.levels && measure_state(result.mesh, target_).is_valid();
+}
+
+/// Returns true if a fit that went on from the mesh of another has the better result.
+bool FreedFit::is_kept(const FitResult& next, const FitResult& result) const {
+  if (next.mesh.num_cells() <= result.mesh.num_cells()) return false;
+  const MeshState now = measure_state(next.mesh, target_), before = measure_state(result.mesh, target_);
+  if (!now.is_valid() || now.is_farther_than(before)) return false;
+  return next.report.stop_reason != StopReason::stalled || now.least_jacobian >= before.least_jacobian;
+}
+
+/// Fits the levels that are left, with a freed mesh as the template.
+void FreedFit::go_on(FitResult& result) {
+  FitResult next = fit_and_free(result.mesh, result.level);
+  FitReport& report = result.report;
+  const bool kept = is_kept(next, result);
+  const std::size_t first = report.stages.size();
+  std::ranges::move(next.report.stages, std::back_inserter(report.stages));
+  add_seconds(next.report.seconds, report);
+  if (!kept) {
+    report.undo_stages(first, report.stages.size());
+    if (!ended_early(next.report.stop_reason)) return;
+    report.stop_reason = next.report.stop_reason;
+    report.explanation = std::move(next.report.explanation);
+    return;
+  }
+  drop_warnings(audit(result.mesh).warnings, next.report);
+  drop_warnings(report.warnings, next.report);
+  std::ranges::move(next.report.warnings, std::back_inserter(report.warnings));
+  report.stop_reason = next.report.stop_reason;
+  report.explanation +=
+      formatted("; the levels from %d on were fitted from that mesh: ", result.level + 1) + next.report.explanation;
+  report.creases = next.report.creases;
+  result.level = next.level;
+  result.cage = std::move(next.cage);
+  result.mesh = std::move(next.mesh);
+}
+
+FitResult FreedFit::run(const VolumeMesh& template_mesh) {
+  FitResult result = fit_and_free(template_mesh, 0);
+  while (can_go_on(result)) {
+    const int level = result.level;
+    go_on(result);
+    if (result.level == level) break;
+  }
+  return result;
 }
 
 }  // namespace
@@ -288,23 +148,11 @@ FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& t
   const MatchedTarget matched = matched_target(target, template_mesh, options.control.cancelled);
   FitOptions used = options;
   used.frees_mesh = options.frees_mesh && can_be_freed(template_mesh, options);
-  if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, used).run();
+  if (matched.regions) return fit_cage(FitTarget(*matched.regions), template_mesh, used).result;
   const TriangleMesh& surface = matched.outer ? *matched.outer : target;
-  constexpr double kLeastSeconds = 1e-3;  // 0 is no limit
-  const StageRunner clock(options.control);
-  if (used.frees_mesh) used.control = part_of_work(options.control, 0, 1 - kShareOfFreeing);
-  SubdivisionFit fit(FitTarget(surface), template_mesh, used);
-  FitResult result = fit.run();
+  FitResult result = used.frees_mesh ? FreedFit(surface, used).run(template_mesh)
+                                     : fit_cage(FitTarget(surface), template_mesh, used).result;
   if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
-  if (used.frees_mesh) {
-    used.control = options.control;
-    if (double& limit = used.control.time_limit_seconds; limit > 0) {
-      if (!clock.in_time("the freeing of the mesh", result.report)) return result;
-      limit = std::max(kLeastSeconds, limit - clock.seconds());
-    }
-    free_mesh(surface, used, fit.take_lifted_mesh(), result);
-    if (result.cage.num_cells() == 0) drop_warnings(audit(template_mesh).warnings, result.report);
-  }
   return result;
 }
 
@@ -314,7 +162,7 @@ FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& tem
   require_closest(options.correspondence);
   FitOptions used = options;
   used.frees_mesh = false;
-  return SubdivisionFit(FitTarget(target, options.point_weights), template_mesh, used).run();
+  return fit_cage(FitTarget(target, options.point_weights), template_mesh, used).result;
 }
 
 }  // namespace subvol

@@ -21,6 +21,7 @@ struct FitResult {
   FitReport report;
   /// Positions of the cage before each minimization that was kept, starting with the template; filled if asked for.
   std::vector<FitState> states;
+  int level = 0;  ///< number of times that the template was subdivided for the mesh
 };
 
 /// Fits a subdivision volume recursively (paper: section 4.3).

@@ -27,6 +27,10 @@ const char* to_string(StopReason reason) {
   return "unknown";
 }
 
+bool ended_early(StopReason reason) {
+  return reason == StopReason::time_limit || reason == StopReason::memory_limit || reason == StopReason::cancelled;
+}
+
 void FitReport::note_start(const StartComparison& start) {
   initial_distance_mean_percent = 100 * start.mean_distance;
   initial_distance_max_percent = 100 * start.max_distance;

@@ -28,6 +28,9 @@ enum class StopReason {
 /// Returns the name of a reason as it stands in reports, such as "time_limit".
 const char* to_string(StopReason reason);
 
+/// Returns true if a limit of time or memory or the caller ended the work before its end.
+bool ended_early(StopReason reason);
+
 /// Returns the stop reason of work that ends with this minimization. No acceptable step and an infeasible start give
 /// `stalled`.
 StopReason stop_reason(MinimizerStop stop);

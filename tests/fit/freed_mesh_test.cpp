@@ -5,10 +5,12 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/subdivision_fit.h"
 #include "subvol/subdivision/audit.h"
+#include "subvol/templates/cell_split.h"
 #include "tests/support/carved_torus.h"
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <string>
 
 using namespace subvol;
@@ -32,6 +34,56 @@ TEST_CASE("A mesh that its cage keeps poor is freed, and gets a layer of cells",
   CHECK(freed.mesh.num_cells() > kept.mesh.num_cells());
   CHECK(freed.report.explanation.find("freed from the cage, with a layer of ") != std::string::npos);
   CHECK(freed.report.stop_reason == StopReason::converged);
+}
+
+TEST_CASE("A fit whose cage stalls goes on from the freed mesh", "[slow]") {
+  const samples::Sample ball = samples::ball_sample();
+  const VolumeMesh tets = split_into_tets(ball.template_mesh);
+  const FitResult stalled = fit_subdivision_volume(ball.target, tets, {.levels = 2});
+  CHECK(stalled.report.stop_reason == StopReason::stalled);
+  CHECK(stalled.level == 1);
+  FitOptions options{.levels = 2, .frees_mesh = true};
+  double last = 0;
+  bool falls = false;
+  options.control.progress = [&](const FitProgress& progress) {
+    falls = falls || progress.fraction < last;
+    last = progress.fraction;
+    return true;
+  };
+  const FitResult freed = fit_subdivision_volume(ball.target, tets, options);
+  CHECK(freed.report.stop_reason == StopReason::converged);
+  CHECK(freed.level == 2);
+  CHECK(freed.mesh.num_cells() >= 8 * stalled.mesh.num_cells());
+  CHECK(freed.report.explanation.find("level 1 could not be reached") == 0);
+  CHECK(freed.report.explanation.find("the levels from 2 on were fitted from that mesh") != std::string::npos);
+  CHECK(std::ranges::any_of(freed.report.stages,
+                            [](const StageRecord& stage) { return stage.kept && stage.level == 2; }));
+  CHECK_FALSE(falls);
+  const MeshCheck check = check_mesh(freed.mesh, &ball.target);
+  CHECK(check.valid());
+  CHECK(check.quality->min_scaled_jacobian > 0.3);
+  CHECK(check.mean_distance_percent() < 0.5);
+}
+
+TEST_CASE("A level that the cage could not reach counts as reached by a freed mesh close to the target", "[slow]") {
+  const samples::Sample ball = samples::ball_sample();
+  const VolumeMesh tets = split_into_tets(ball.template_mesh);
+  const FitResult freed = fit_subdivision_volume(ball.target, tets, {.levels = 1, .frees_mesh = true});
+  CHECK(freed.report.stop_reason == StopReason::converged);
+  CHECK(freed.level == 1);
+  CHECK(check_mesh(freed.mesh).valid());
+}
+
+TEST_CASE("A fit that goes on from a freed mesh can be cancelled at any time", "[slow]") {
+  const samples::Sample ball = samples::ball_sample();
+  const VolumeMesh tets = split_into_tets(ball.template_mesh);
+  for (const double share : {0.1, 0.3, 0.6, 0.9}) {
+    FitOptions options{.levels = 2, .frees_mesh = true};
+    options.control.progress = [share](const FitProgress& progress) { return progress.fraction < share; };
+    const FitResult result = fit_subdivision_volume(ball.target, tets, options);
+    CHECK(result.report.stop_reason == StopReason::cancelled);
+    CHECK(check_mesh(result.mesh).valid());
+  }
 }
 
 TEST_CASE("A mesh whose cells are good keeps its cage", "[slow]") {
