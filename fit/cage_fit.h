@@ -21,6 +21,7 @@ struct CageFit {
 ///
 /// options        as for `fit_subdivision_volume`, which states the errors.
 /// levels_before  number of levels of the fit whose mesh is the template; the report counts levels from there.
+///                If it is positive and memory runs out in the first level, the result has no cells.
 CageFit fit_cage(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options, int levels_before = 0);
 
 }  // namespace subvol::internal

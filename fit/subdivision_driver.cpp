@@ -367,7 +367,7 @@ void SubdivisionDriver::begin(double own_box_share) {
 }
 
 bool SubdivisionDriver::end_for_memory(const std::string& why) {
-  if (result_.mesh.num_cells() == 0) throw std::runtime_error("out of memory: " + why);
+  if (result_.mesh.num_cells() == 0 && levels_before_ == 0) throw std::runtime_error("out of memory: " + why);
   result_.report.stop_reason = StopReason::memory_limit;
   result_.report.explanation = why;
   return false;

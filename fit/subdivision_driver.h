@@ -57,7 +57,7 @@ class SubdivisionDriver : protected StagedFit {
   void begin(double own_box_share);
   /// Checks that the memory suffices for the next level.
   bool has_room();
-  /// Ends the fit with the stored state. Throws std::runtime_error if there is none.
+  /// Ends the fit with the stored state. Throws std::runtime_error if there is none and no fit went before.
   bool end_for_memory(const std::string& why);
   void prepare_level();
   bool start_level();

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -104,7 +105,7 @@ bool FreedFit::is_kept(const FitResult& next, const FitResult& result) const {
   return next.report.stop_reason != StopReason::stalled || now.least_jacobian >= before.least_jacobian;
 }
 
-/// Fits the levels that are left, with a freed mesh as the template.
+/// Fits the levels that are left, with a freed mesh as the template, and keeps the better of the two results.
 void FreedFit::go_on(FitResult& result) {
   FitResult next = fit_and_free(result.mesh, result.level);
   FitReport& report = result.report;
@@ -135,7 +136,12 @@ FitResult FreedFit::run(const VolumeMesh& template_mesh) {
   FitResult result = fit_and_free(template_mesh, 0);
   while (can_go_on(result)) {
     const int level = result.level;
-    go_on(result);
+    try {
+      go_on(result);
+    } catch (const std::bad_alloc&) {
+      result.report.stop_reason = StopReason::memory_limit;
+      result.report.explanation = "no memory was left to go on from the freed mesh";
+    }
     if (result.level == level) break;
   }
   return result;
