@@ -16,13 +16,12 @@ namespace {
 /// fits end with the first. In the middle of one that ends with the second or the third, the share is 0.34 or 0.68.
 constexpr std::array<double, kAutomaticEdgeCells.size()> kEdgePortions{0.2, 0.5, 0.67};
 
-/// Returns the number of cells from which a mesh gets about this many if it is subdivided so many times.
+}  // namespace
+
 std::size_t cells_before(std::size_t cells, int levels) {
   for (int level = 0; level < levels; ++level) cells /= kChildren;
   return std::max(cells, kLeastTemplateCells);
 }
-
-}  // namespace
 
 std::size_t cells_after(std::size_t cells, int levels) {
   for (int level = 0; level < levels; ++level) cells *= kChildren;

@@ -34,6 +34,10 @@ struct AutomaticAttempt {
 /// Returns the number of cells that a template of so many becomes if it is subdivided so many times.
 std::size_t cells_after(std::size_t cells, int levels);
 
+/// Returns the number of cells from which a mesh gets about this many if it is subdivided so many times; at least
+/// `kLeastTemplateCells`.
+std::size_t cells_before(std::size_t cells, int levels);
+
 /// Returns the attempts to make, in this order, until a fit is good.
 /// has_edges  the target has sharp edges to follow.
 std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges);

@@ -370,13 +370,8 @@ AutomaticFitResult AutomaticFit::run() {
 
 AutomaticFitResult fit_automatically(const TriangleMesh& given, const AutomaticFitOptions& options) {
   const TriangleMesh target = joined_at_open_edges(given);
-  if (const std::optional<RegionSurface> regions = find_regions(target, options.regions)) {
-    if (options.makes_cage)
-      throw InputError(
-          "AutomaticFitOptions::makes_cage: the target has several regions; give a template with these to "
-          "fit_subdivision_volume");
+  if (const std::optional<RegionSurface> regions = find_regions(target, options.regions))
     return fit_regions(*regions, options);
-  }
   const AutomaticFitOptions checked = checked_options(options);
   const EdgeDecision edges = decide_about_edges(target, checked.crease_angle_degrees, checked.follows_all_edges);
   const auto fit = [&](bool follows_borders, const AutomaticFitOptions& chosen) {

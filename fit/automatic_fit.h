@@ -61,7 +61,7 @@ struct AutomaticFitOptions {
   /// not set, and edges are followed (`crease_angle_degrees`), this is tried if a result without it misses groups.
   bool keeps_groups = false;
   /// The result is a subdivision volume: a control mesh, the cage, whose vertices are the degrees of freedom, and the
-  /// mesh that it is subdivided to once. `cells` are then those of that mesh. Only for targets of one region.
+  /// mesh that it is subdivided to once. `cells` are then those of that mesh.
   bool makes_cage = false;
   /// Number of times that the template of a cage is subdivided to the mesh, in [1, 6]; once if edges are followed.
   int levels = 1;
@@ -195,6 +195,9 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
 /// so that parts of sheets correspond to parts between curves, and faces on flat parts become exactly flat. Else the
 /// template has about an eighth of the cells and is refined once, unless the regions need more; without `cells`, one of
 /// 40,000 cells that is not refined is tried at last.
+///
+/// With `makes_cage`, a cage is made as by `fit_automatically`. Its interfaces keep their subdivision surfaces, and the
+/// volumes of regions are those of the mesh.
 ///
 /// Larger templates are tried, and trials relaxed, as by `fit_automatically`; distances are the largest of the outer
 /// surface's and of all interfaces', and the merit also counts

@@ -4,11 +4,11 @@
 #include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/automatic_fit.h"
-#include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/features/sheet_layout.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/level_samples.h"
 #include "subvol/fit/fits/local_cells.h"
 #include "subvol/fit/fits/region_volumes.h"
 #include "subvol/fit/fits/smooth_refinement.h"
@@ -73,9 +73,13 @@ class RegionFit : AutomaticDriver {
   PillowChoice pillow_choice(const VolumeMesh& grid) const;
   bool is_exact(const VolumeMesh& grid) const;
   bool lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const;
+  void begin_cage() override;
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) override;
   void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
   double volume_percent() const;
+  void make_exact(bool is_relaxed);
+  SurfaceDistance outer_distance() const;
+  std::optional<CreaseDistance> distance_of_curves() const;
   /// Where sheets meet in curves, cells gain quality if the curves leave the planes of flat sheets: with the distance
   /// allowed as the aim, those of 19-wavy were 0.5 % of the diagonal off, with this one 0.02 %, at a least scaled
   /// Jacobian of 0.45 instead of 0.58.
@@ -91,7 +95,8 @@ class RegionFit : AutomaticDriver {
   ClosestPoint tree_;   ///< over all its triangles
   bool follows_edges_ = false;
   SheetCurves curves_;                 ///< to follow, if edges are followed
-  std::optional<SheetLayout> layout_;  ///< of mesh_; none: sheets correspond as wholes
+  std::optional<SheetLayout> layout_;  ///< of mesh_, or of its cage; none: sheets correspond as wholes
+  FollowedCreases level_creases_;      ///< of mesh_, from layout_
   RegionTemplate template_;            ///< the last one, without its mesh
   double least_edge_ = 0;              ///< share of its wanted length that an edge must have on its grid
 };
@@ -203,35 +208,42 @@ void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& to
     boundary.group_of_triangle.push_back(key_of(unit_.pair(static_cast<std::size_t>(t))));
 }
 
+void RegionFit::begin_cage() {
+  if (layout_) layout_->creases.keep_from_folding(mesh_);
+  AutomaticDriver::begin_cage();
+  if (!layout_) return;
+  level_creases_ = layout_->creases;
+  level_creases_.refine(cage_->level().parent_creases);
+}
+
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
 bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
-  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
   const MeshTopology topology(mesh_);
   QualityBoundary boundary;
   boundary.interfaces = find_interfaces(mesh_, topology).faces;
   const std::size_t faces = topology.boundary_faces().size() + boundary.interfaces.size();
   const double h = std::sqrt(target_.surface.area() / static_cast<double>(faces));
   const std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
-  BoundarySamples samples =
-      make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
+  const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of_sheets(mesh_);
   sample_target(faces);
-  boundary.samples = std::move(samples.positions);
+  boundary.samples = samples.positions;
   boundary.triangles = samples.triangles;
-  boundary.triangle_faces = samples.triangle_faces;
+  boundary.triangle_faces = samples.faces;
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
-    boundary.group_of_face = layout_->group_of_face;
+    boundary.group_of_face = cage_ ? cage_->groups_of_parts(layout_->group_of_face) : layout_->group_of_face;
     for (const Index t : target_.region_triangle) boundary.group_of_triangle.push_back(layout_->group_of_triangle[t]);
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
-        return layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+        const FollowedCreases& followed = cage_ ? level_creases_ : layout_->creases;
+        return followed.energy(samples.crease_edges, samples.positions.num_rows(), width, kQualityTangentialWeight);
       };
   } else {
     group_by_pairs(boundary, topology);
   }
   return run_stages(boundary, lengths, creases, level, schedule, what,
-                    [this](QualityStages& stages) { stages.energy().forbid_folds({}, least_edge_); });
+                    [this](QualityStages& stages) { stages.energy().forbid_folds({}, cage_ ? 0 : least_edge_); });
 }
 
 /// Returns the largest difference of a region's volume from the target's, in percent.
@@ -243,28 +255,47 @@ double RegionFit::volume_percent() const {
   return largest;
 }
 
-/// Makes flat sheets of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
-/// fit must end.
-bool RegionFit::judge(AutomaticFitTrial trial) {
+/// Makes flat sheets of the present mesh exactly so, and gives its regions the volumes of the target's, unless cells
+/// become too poor.
+void RegionFit::make_exact(bool is_relaxed) {
   // A cell may become as poor, for what is exact.
   constexpr double kLeastAfterFlattening = 0.45, kLeastAfterVolumes = 0.3;
+  if (follows_edges_ && !is_relaxed) flatten_sheets(cage_ ? cage_->cage : mesh_, target_, kLeastAfterFlattening);
+  follow_cage();
+  if (cage_)
+    restore_volumes(*cage_, unit_.volumes, kLeastAfterVolumes);
+  else
+    restore_volumes(mesh_, unit_.volumes, kLeastAfterVolumes);
+  follow_cage();
+}
 
-  if (follows_edges_ && !trial.relaxed_at) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
-  restore_volumes(mesh_, unit_.volumes, kLeastAfterVolumes);
+std::optional<CreaseDistance> RegionFit::distance_of_curves() const {
+  if (!layout_ || curves_.features.curves.empty()) return std::nullopt;
+  if (cage_)
+    return level_creases_.distance(cage_->limit().crease_edges, cage_->limit_surface().positions, 1,
+                                   &curves_.features.curves);
+  return crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
+}
+
+/// Makes the present mesh exact, measures it and keeps it if it is the best. Returns false if the fit must end.
+bool RegionFit::judge(AutomaticFitTrial trial) {
+  if (options_.makes_cage && !cage_) begin_cage();  // the fit ended before it came to that
+  make_exact(trial.relaxed_at.has_value());
   const QualityReport quality = measure_quality(mesh_);
-  const SurfaceDistance outer = target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
-  const SurfaceDistance inner = target_.interface_distance(mesh_);
   trial.through_planes = template_.through_planes;
   trial.wrong_sheets = template_.wrong_sheets;
-  trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
-  trial.max_percent = 100 * std::max(outer.max(), inner.max());
+  trial.mean_percent = trial.max_percent = 0;  // the trial may have those of another state
+  const auto count = [&](const SurfaceDistance& distance) {
+    trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
+    trial.max_percent = std::max(trial.max_percent, 100 * distance.max());
+  };
+  count(target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)))));
+  count(target_.interface_distance(mesh_));
+  if (cage_) count(target_.distance(cage_->limit_surface()));
   trial.volume_percent = volume_percent();
   trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_, MeshTopology(mesh_)), result_.report);
-  std::optional<CreaseDistance> edges;
-  if (layout_ && !curves_.features.curves.empty())
-    edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
   const bool going = trial.self_intersections.has_value();
-  keep_if_best(std::move(trial), quality, edges,
+  keep_if_best(std::move(trial), quality, distance_of_curves(),
                layout_ ? layout_->routing.unfollowed : std::vector<UnfollowedCurve>{});
   return going;
 }
@@ -284,13 +315,15 @@ bool RegionFit::make_pillowed(std::size_t most) {
   }
 }
 
-/// Fits a pillowed grid that is refined once, unless the regions need too many cells for that.
+/// Fits a pillowed grid that is refined once, unless the regions need too many cells for that. If a cage is made, it is
+/// refined as often as asked for.
 bool RegionFit::run_smooth(std::size_t cells) {
   // Share of the cells asked for: a pillowed grid of more would have too many once it is refined.
   constexpr double kMostExcess = 1.4;
-  const std::size_t coarse = std::max(kLeastTemplateCells, cells / kChildren);
+  int levels = options_.makes_cage ? options_.levels : 1;
+  const std::size_t coarse = cells_before(cells, levels);
   if (!make_pillowed(coarse)) return !no_template_.empty();
-  int levels = 1;
+  if (options_.makes_cage) return fit_and_refine(levels);
   if (static_cast<double>(mesh_.num_cells()) > kMostExcess * static_cast<double>(coarse)) {
     levels = 0;
     if (mesh_.num_cells() < cells / 2 && !make_pillowed(cells)) return !no_template_.empty();
@@ -305,7 +338,7 @@ bool RegionFit::run_unrefined(std::size_t cells) {
   return make_pillowed(cells) ? fit_and_refine(0) : !no_template_.empty();
 }
 
-/// Fits a grid whose sheets are routed and padded.
+/// Fits a grid whose sheets are routed and padded. If a cage is made, that is the padded grid.
 bool RegionFit::run_curves(std::size_t cells) {
   double asked = kAskedShare * static_cast<double>(cells);
   for (int round = 1;; ++round) {
@@ -314,6 +347,7 @@ bool RegionFit::run_curves(std::size_t cells) {
     mesh_ = *grid;
     begin_mesh();
     layout_.reset();
+    cage_.reset();
     if (!is_exact(*grid) && !fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
       if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
       return false;
@@ -327,6 +361,10 @@ bool RegionFit::run_curves(std::size_t cells) {
       continue;
     }
     AutomaticFitTrial trial{.template_cells = grid->num_cells(), .pads = layout_->pads.value_or(0)};
+    if (options_.makes_cage && !fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) {
+      if (result_.trials.empty()) judge(std::move(trial));
+      return false;
+    }
     return fit_edges(std::move(trial), 1) && relax_last_trial();
   }
 }
@@ -334,6 +372,7 @@ bool RegionFit::run_curves(std::size_t cells) {
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.
 bool RegionFit::run_count(std::size_t cells) {
   layout_.reset();
+  cage_.reset();
   no_template_.clear();
   return follows_edges_ ? run_curves(cells) : run_smooth(cells);
 }
@@ -367,7 +406,8 @@ AutomaticFitResult RegionFit::run() {
   result_.topology = solid_boundary(outer_surface(original_)).topology;
   std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
   if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
-  if (options_.cells) counts = {*options_.cells};
+  if (options_.cells)
+    counts = {options_.makes_cage && follows_edges_ ? cells_before(*options_.cells, 1) : *options_.cells};
   std::vector<AutomaticAttempt> attempts;
   for (const std::size_t count : counts) attempts.push_back({AutomaticAttempt::Kind::smooth, count, 0});
   bool going = true;
@@ -376,7 +416,7 @@ AutomaticFitResult RegionFit::run() {
         expected_portion(std::span(attempts).subspan(i), result_.trials.empty() ? nullptr : &best(), options_));
     going = run_count(counts[i]);
   }
-  if (going && !is_good() && !follows_edges_ && !options_.cells) {
+  if (going && !is_good() && !follows_edges_ && !options_.cells && !options_.makes_cage) {
     begin_attempt();
     going = run_unrefined(counts.back());
   }
@@ -384,13 +424,13 @@ AutomaticFitResult RegionFit::run() {
   if (going) going = polish();
   if (going) conclude();
   if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
+  if (result_.cage.num_cells() > 0) add_interface_groups(result_.cage);
   return finish(going, "curves");
 }
 
 }  // namespace
 
 AutomaticFitResult fit_regions(const RegionSurface& target, const AutomaticFitOptions& options) {
-  if (options.makes_cage) throw InputError("AutomaticFitOptions::makes_cage: fits of several regions make none");
   return RegionFit(target, options).run();
 }
 

@@ -37,7 +37,7 @@ class AutomaticFitRun : public CageRun {
  public:
   AutomaticFitRun(const AutomaticFitArguments& arguments, const CLI::App& verb)
       : CageRun(arguments.run, verb), arguments_(arguments) {}
-  std::optional<int> run();
+  int run();
 
  private:
   void load();
@@ -164,10 +164,9 @@ void AutomaticFitRun::summarize() const {
   tell_outputs();
 }
 
-std::optional<int> AutomaticFitRun::run() {
+int AutomaticFitRun::run() {
   prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary, Part::region});
   timed("read", &AutomaticFitRun::load);
-  if (regions_ && arguments_.fit.makes_cage) return std::nullopt;
   tell_warnings();
   timed("fit", &AutomaticFitRun::fit);
   if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet
@@ -183,7 +182,7 @@ std::optional<int> AutomaticFitRun::run() {
 
 }  // namespace
 
-std::optional<int> run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb) {
+int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb) {
   return AutomaticFitRun(arguments, verb).run();
 }
 

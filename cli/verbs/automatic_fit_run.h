@@ -31,8 +31,7 @@ struct AutomaticFitArguments {
   std::vector<std::string> unused_options{};  ///< names, without dashes, of options whose defaults play no part here
 };
 
-/// Fills a surface with hexes from files to files; returns an ExitStatus. Returns nothing, and has done nothing, if a
-/// cage is asked for and the target has several regions.
-std::optional<int> run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb);
+/// Fills a surface with hexes from files to files; returns an ExitStatus.
+int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb);
 
 }  // namespace subvol::cli

@@ -169,7 +169,7 @@ void refuse_automatic_options(const CLI::App& verb) {
     if (verb.count(option) > 0)
       throw UsageError(option +
                        ": only an automatic fit takes this option: leave out --template, --order and options of the "
-                       "method (such as --cage-only), and make no cage of several regions");
+                       "method (such as --cage-only)");
 }
 
 AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const CLI::App& verb) {
@@ -239,11 +239,7 @@ SubdivisionFitArguments subdivision_arguments(const FitArguments& arguments, con
 
 int run_fit(const FitArguments& given, const CLI::App& verb) {
   FitArguments arguments = given;
-  if (is_automatic(given, verb)) {
-    const AutomaticFitArguments automatic = automatic_arguments(given, verb);
-    if (const std::optional<int> status = run_automatic_fit(automatic, verb)) return *status;
-    arguments.fit.levels = automatic.fit.levels;
-  }
+  if (is_automatic(given, verb)) return run_automatic_fit(automatic_arguments(given, verb), verb);
   refuse_automatic_options(verb);
   arguments.fit.crease_angle_degrees = crease_angle(given, std::nullopt);
   arguments.fit.quality = given.quality;

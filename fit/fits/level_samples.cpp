@@ -9,12 +9,23 @@
 
 namespace subvol::internal {
 
-LevelSamples samples_of(const VolumeMesh& mesh) {
-  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
-  BoundarySamples samples =
-      make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), kIntervals, mesh.tags.creases);
+namespace {
+
+constexpr int kSampledIntervals = 2;  // along an edge: corners, middles of edges and of faces
+
+LevelSamples taken(BoundarySamples samples) {
   return {std::move(samples.positions), std::move(samples.triangles), std::move(samples.triangle_faces),
           std::move(samples.crease_edges)};
+}
+
+}  // namespace
+
+LevelSamples samples_of(const VolumeMesh& mesh) {
+  return taken(make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), kSampledIntervals, mesh.tags.creases));
+}
+
+LevelSamples samples_of_sheets(const VolumeMesh& mesh) {
+  return taken(make_sheet_samples(ElementSpace(mesh, Basis::legendre, 1), mesh, kSampledIntervals, mesh.tags.creases));
 }
 
 LevelSamples samples_of(const FittedCage& cage) {

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 namespace subvol::internal {
@@ -148,10 +149,11 @@ bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> fac
   return true;
 }
 
-}  // namespace
-
-bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kRounds = 6;        // Newton steps at most; they end at kEnough
+/// Moves the vertices of a mesh so that its regions get their volumes; see `restore_volumes`.
+/// follow  called after each move with the positions before it; may change those of the mesh.
+/// rounds  steps at most.
+bool restore_by_moves(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian, int rounds,
+                      const std::function<void(const std::vector<Vec3>&)>& follow) {
   constexpr double kEnough = 1e-6;  // relative
   const MeshTopology topology(mesh);
   const std::vector<SheetFace> faces = sheet_faces(mesh, topology);
@@ -159,7 +161,7 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
   const std::vector<Vec3> before = mesh.positions;
   const QualityReport quality = measure_quality(mesh);
   const std::vector<Mat3> projectors = projectors_of(faces, mesh);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const std::vector<double> now = region_volumes(mesh);
     Eigen::VectorXd missing(num_regions);
     double worst = 0;
@@ -167,13 +169,35 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
       missing[r] = wanted[static_cast<std::size_t>(r)] - now[static_cast<std::size_t>(r)];
       worst = std::max(worst, std::abs(missing[r]) / wanted[static_cast<std::size_t>(r)]);
     }
+    const std::vector<Vec3> start = mesh.positions;
     if (worst < kEnough || !move_towards(missing, faces, projectors, mesh)) break;
+    follow(start);
   }
   const QualityReport after = measure_quality(mesh);
   bool good = after.certificate.not_certified.size() <= quality.certificate.not_certified.size();
   for (std::size_t c = 0; c < after.cell_minima.size() && good; ++c)
     good = after.cell_minima[c] >= std::min(least_jacobian, quality.cell_minima[c] - 1e-3);
   if (!good) mesh.positions = before;
+  return good;
+}
+
+}  // namespace
+
+bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
+  constexpr int kRounds = 6;  // of Newton's method
+  return restore_by_moves(mesh, wanted, least_jacobian, kRounds, [](const std::vector<Vec3>&) {});
+}
+
+bool restore_volumes(FittedCage& cage, std::span<const double> wanted, double least_jacobian) {
+  constexpr int kRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
+  const std::vector<Vec3> before = cage.cage.positions;
+  VolumeMesh mesh = cage.mesh();
+  const bool good = restore_by_moves(mesh, wanted, least_jacobian, kRounds, [&](const std::vector<Vec3>& start) {
+    std::vector<Vec3>& x = cage.cage.positions;
+    for (std::size_t v = 0; v < x.size(); ++v) x[v] += mesh.positions[v] - start[v];
+    mesh.positions = cage.nodes();
+  });
+  if (!good) cage.cage.positions = before;
   return good;
 }
 

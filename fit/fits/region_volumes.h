@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <span>
@@ -20,5 +21,9 @@ namespace subvol::internal {
 /// returns  false, with the mesh as it was, if a cell would lose its certificate, or a cell that is poorer than
 ///          `least_jacobian` would become poorer; or if no such move exists.
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian);
+
+/// Does the same for the mesh of a cage by moving the cage's vertices: each by the move d_v of the mesh's vertex of the
+/// same number, which lies beside it. Where d is smooth, the mesh moves by about d.
+bool restore_volumes(FittedCage& cage, std::span<const double> wanted, double least_jacobian);
 
 }  // namespace subvol::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/quality/high_order_quality.h"
@@ -12,6 +13,8 @@
 #include "tests/support/region_fixtures.h"
 
 #include <catch2/catch.hpp>
+
+#include <algorithm>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -61,6 +64,27 @@ TEST_CASE("Slabs and a box in a box are filled exactly, with their interfaces in
     CHECK(result.trials[result.chosen].within_share == Approx(1));
     CHECK(result.mesh.face_groups.groups.size() == surface->regions.size() - 1);
     CHECK(result.mesh.face_groups.groups[0].name == "region 1|region 2");
+  }
+}
+
+TEST_CASE("A cage with regions has their volumes, and flat interfaces stay flat", "[regions][slow]") {
+  for (const TriangleMesh& target :
+       {test::slabs_surface(3), together(ball_surface({0, 0, 0}, 1, 3), ball_surface({0.1, 0, 0}, 0.5, 3))}) {
+    const auto surface = find_regions(target, RegionRule::keep);
+    REQUIRE(surface);
+    const bool is_flat = surface->regions.size() == 3;
+    const AutomaticFitResult result = fitted(
+        *surface, {.cells = std::size_t(is_flat ? 4000 : 12000), .makes_cage = true}, is_flat ? 0.99 : 0.4, 1e-3);
+    const AutomaticFitTrial& best = result.trials[result.chosen];
+    CHECK(best.max_percent < (is_flat ? 1e-6 : 1.0));
+    REQUIRE(result.cage.num_cells() * 8 == result.mesh.num_cells());
+    CHECK(region_references(result.cage) == region_references(result.mesh));
+    // The mesh is the one that the cage is subdivided to, with its sheets at limit positions.
+    const std::vector<Vec3> again = FittedCage(result.cage).nodes();
+    double difference = 0;
+    for (std::size_t v = 0; v < again.size(); ++v)
+      difference = std::max(difference, (again[v] - result.mesh.positions[v]).norm());
+    CHECK(difference < 1e-9);
   }
 }
 
