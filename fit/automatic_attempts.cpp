@@ -40,6 +40,7 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
             {kind, counts[i], 0, i + 1 == counts.size(), options.cells ? kAttemptPortion : kEdgePortions[i]});
   } else if (options.makes_cage) {
     std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+    counts.push_back(kMostAutomaticCells);
     if (options.cells) counts = {*options.cells};
     for (const std::size_t cells : counts)
       attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});

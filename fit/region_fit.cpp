@@ -405,6 +405,7 @@ AutomaticFitResult RegionFit::run() {
   find_curves();
   result_.topology = solid_boundary(outer_surface(original_)).topology;
   std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+  if (options_.makes_cage) counts.push_back(kMostAutomaticCells);  // instead of meshes that are not refined
   if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
   if (options_.cells)
     counts = {options_.makes_cage && follows_edges_ ? cells_before(*options_.cells, 1) : *options_.cells};
