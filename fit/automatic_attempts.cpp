@@ -28,6 +28,11 @@ std::size_t cells_after(std::size_t cells, int levels) {
   return cells;
 }
 
+void drop_equal_templates(int levels, std::vector<std::size_t>& counts) {
+  const auto same = [&](std::size_t a, std::size_t b) { return cells_before(a, levels) == cells_before(b, levels); };
+  counts.erase(std::unique(counts.begin(), counts.end(), same), counts.end());
+}
+
 std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
   using Kind = AutomaticAttempt::Kind;
   std::vector<AutomaticAttempt> attempts;
@@ -42,6 +47,7 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
     std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
     counts.push_back(kMostAutomaticCells);
     if (options.cells) counts = {*options.cells};
+    drop_equal_templates(options.levels, counts);
     for (const std::size_t cells : counts)
       attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
   } else {

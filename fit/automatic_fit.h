@@ -196,8 +196,9 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
 /// template has about an eighth of the cells and is refined once, unless the regions need more; without `cells`, one of
 /// 40,000 cells that is not refined is tried at last.
 ///
-/// With `makes_cage`, a cage is made as by `fit_automatically`. Its interfaces keep their subdivision surfaces, and the
-/// volumes of regions are those of the mesh.
+/// With `makes_cage`, a cage is made as by `fit_automatically`, and 100,000 cells are tried at last. Interfaces of the
+/// cage are subdivision surfaces. The regions of the mesh have the volumes of the target's. Borders between groups are
+/// not followed.
 ///
 /// Larger templates are tried, and trials relaxed, as by `fit_automatically`; distances are the largest of the outer
 /// surface's and of all interfaces', and the merit also counts

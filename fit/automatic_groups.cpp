@@ -28,11 +28,6 @@ AutomaticFitOptions with_progress(AutomaticFitOptions options, double from, doub
   return options;
 }
 
-bool has_ended_early(const FitReport& report) {
-  return report.stop_reason == StopReason::time_limit || report.stop_reason == StopReason::memory_limit ||
-         report.stop_reason == StopReason::cancelled;
-}
-
 /// Adds the trials, stages and seconds of a fit to those of another one, before or after its own.
 void add(AutomaticFitResult& result, const AutomaticFitResult& other, bool before) {
   const auto put = [before](auto& list, const auto& others) {
@@ -88,7 +83,7 @@ std::size_t num_groups_missed(const TriangleMesh& target, const VolumeMesh& mesh
 AutomaticFitResult fit_for_groups(const TriangleMesh& target, const AutomaticFitOptions& options,
                                   const GroupedFit& fit) {
   AutomaticFitResult first = fit(false, with_progress(options, 0, kFirstShare));
-  if (has_ended_early(first.report)) return first;
+  if (ended_early(first.report.stop_reason)) return first;
   const std::size_t missed = num_groups_missed(target, first.mesh);
   if (missed == 0) return first;
   AutomaticFitOptions left = with_progress(options, kFirstShare, 1);

@@ -171,7 +171,10 @@ std::vector<UnfollowedCurve> AutomaticSolidDriver::unfollowed_curves() const {
 }
 
 bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
-  if (options_.makes_cage && !cage_) begin_cage();  // the fit ended before it came to that
+  if (options_.makes_cage && !cage_) {  // the fit ended before it came to that
+    begin_cage();
+    ++trial.level;
+  }
   // Flattening a relaxed place could make its faces meet again. The rest of that mesh is flat from the trial before.
   if (follows_.any() && !trial.relaxed_at) {
     flatten_faces(cage_ ? cage_->cage : mesh_, target_.mesh, *target_.tree, facets_);

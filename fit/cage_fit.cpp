@@ -2,7 +2,6 @@
 #include "subvol/fit/cage_fit.h"
 
 #include "subvol/base/format.h"
-#include "subvol/fit/energies/make_surface_term.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/subdivision_driver.h"
 

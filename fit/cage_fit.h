@@ -11,8 +11,8 @@ namespace subvol::internal {
 /// A fit whose degrees of freedom are the vertices of a cage.
 struct CageFit {
   FitResult result;
-  /// The finest mesh with lifted cells, if the surface suffered too much for the cage: its vertices, once free, find
-  /// back. Without cells if there is none, or if `FitOptions::frees_mesh` is not set.
+  /// The finest mesh with lifted cells, if its surface was too far off for the cage. If its vertices are freed, they
+  /// come back to the surface. Without cells if there is none, or if `FitOptions::frees_mesh` is not set.
   VolumeMesh lifted;
 };
 

@@ -48,8 +48,9 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 /// options  of the fit; the time limit is what is left of it, and the progress that of this work alone.
 /// lifted   the mesh in another state of the same fit, with better cells on a surface that may be farther off; without
 ///          cells if there is none.
-/// result   of a fit; nothing is done if a limit or the caller ended it. If it stalled, its mesh is that of a lower
-///          level.
+/// result   of a fit; nothing is done if a limit or the caller ended it. If it stalled, its mesh is that of the level
+///          that could not be reached. If that was the finest one, and the freed mesh is valid and close to the target,
+///          the fit counts as done.
 /// If memory runs out, what was kept before is the result, with the stop reason `memory_limit`.
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result);
 

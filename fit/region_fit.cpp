@@ -29,6 +29,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -78,7 +80,7 @@ class RegionFit : AutomaticDriver {
   void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
   double volume_percent() const;
   void make_exact(bool is_relaxed);
-  SurfaceDistance outer_distance() const;
+  void flatten_cage(double least_jacobian);
   std::optional<CreaseDistance> distance_of_curves() const;
   /// Where sheets meet in curves, cells gain quality if the curves leave the planes of flat sheets: with the distance
   /// allowed as the aim, those of 19-wavy were 0.5 % of the diagonal off, with this one 0.02 %, at a least scaled
@@ -209,7 +211,7 @@ void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& to
 }
 
 void RegionFit::begin_cage() {
-  if (layout_) layout_->creases.keep_from_folding(mesh_);
+  (layout_ ? layout_->creases : FollowedCreases()).keep_from_folding(mesh_);
   AutomaticDriver::begin_cage();
   if (!layout_) return;
   level_creases_ = layout_->creases;
@@ -255,18 +257,35 @@ double RegionFit::volume_percent() const {
   return largest;
 }
 
+/// Makes flat sheets of the present cage exactly so, unless its mesh loses certificates or becomes poorer than both
+/// before and this.
+void RegionFit::flatten_cage(double least_jacobian) {
+  const std::vector<Vec3> before = cage_->cage.positions;
+  const QualityReport quality = measure_quality(mesh_);
+  flatten_sheets(cage_->cage, target_, least_jacobian);
+  follow_cage();
+  const QualityReport after = measure_quality(mesh_);
+  if (after.certificate.not_certified.size() <= quality.certificate.not_certified.size() &&
+      after.min_scaled_jacobian >= std::min(least_jacobian, quality.min_scaled_jacobian))
+    return;
+  cage_->cage.positions = before;
+  follow_cage();
+}
+
 /// Makes flat sheets of the present mesh exactly so, and gives its regions the volumes of the target's, unless cells
 /// become too poor.
 void RegionFit::make_exact(bool is_relaxed) {
   // A cell may become as poor, for what is exact.
   constexpr double kLeastAfterFlattening = 0.45, kLeastAfterVolumes = 0.3;
-  if (follows_edges_ && !is_relaxed) flatten_sheets(cage_ ? cage_->cage : mesh_, target_, kLeastAfterFlattening);
-  follow_cage();
-  if (cage_)
+  const bool flattens = follows_edges_ && !is_relaxed;
+  if (cage_) {
+    if (flattens) flatten_cage(kLeastAfterFlattening);
     restore_volumes(*cage_, unit_.volumes, kLeastAfterVolumes);
-  else
+    follow_cage();
+  } else {
+    if (flattens) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
     restore_volumes(mesh_, unit_.volumes, kLeastAfterVolumes);
-  follow_cage();
+  }
 }
 
 std::optional<CreaseDistance> RegionFit::distance_of_curves() const {
@@ -279,7 +298,10 @@ std::optional<CreaseDistance> RegionFit::distance_of_curves() const {
 
 /// Makes the present mesh exact, measures it and keeps it if it is the best. Returns false if the fit must end.
 bool RegionFit::judge(AutomaticFitTrial trial) {
-  if (options_.makes_cage && !cage_) begin_cage();  // the fit ended before it came to that
+  if (options_.makes_cage && !cage_) {  // the fit ended before it came to that
+    begin_cage();
+    ++trial.level;
+  }
   make_exact(trial.relaxed_at.has_value());
   const QualityReport quality = measure_quality(mesh_);
   trial.through_planes = template_.through_planes;
@@ -403,14 +425,19 @@ void RegionFit::conclude() {
 
 AutomaticFitResult RegionFit::run() {
   find_curves();
+  if (options_.keeps_groups && !group_borders(original_.mesh, original_.mesh).empty())
+    result_.report.warnings.push_back(
+        "borders between groups of faces are not followed, because the target has several regions");
   result_.topology = solid_boundary(outer_surface(original_)).topology;
   std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
   if (options_.makes_cage) counts.push_back(kMostAutomaticCells);  // instead of meshes that are not refined
   if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
   if (options_.cells)
     counts = {options_.makes_cage && follows_edges_ ? cells_before(*options_.cells, 1) : *options_.cells};
+  if (options_.makes_cage && !follows_edges_) drop_equal_templates(options_.levels, counts);
   std::vector<AutomaticAttempt> attempts;
-  for (const std::size_t count : counts) attempts.push_back({AutomaticAttempt::Kind::smooth, count, 0});
+  const int levels = options_.makes_cage && follows_edges_ ? 1 : 0;  // from these counts to those of the mesh
+  for (const std::size_t count : counts) attempts.push_back({AutomaticAttempt::Kind::smooth, count, levels});
   bool going = true;
   for (std::size_t i = 0; i < counts.size() && going && !is_good(); ++i) {
     begin_attempt(

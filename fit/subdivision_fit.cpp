@@ -102,7 +102,9 @@ bool FreedFit::is_kept(const FitResult& next, const FitResult& result) const {
   if (next.mesh.num_cells() <= result.mesh.num_cells()) return false;
   const MeshState now = measure_state(next.mesh, target_), before = measure_state(result.mesh, target_);
   if (!now.is_valid() || now.is_farther_than(before)) return false;
-  return next.report.stop_reason != StopReason::stalled || now.least_jacobian >= before.least_jacobian;
+  const StopReason reason = next.report.stop_reason;
+  const bool is_done = reason != StopReason::stalled && !ended_early(reason);
+  return is_done || now.least_jacobian >= before.least_jacobian;
 }
 
 /// Fits the levels that are left, with a freed mesh as the template, and keeps the better of the two results.
@@ -115,9 +117,10 @@ void FreedFit::go_on(FitResult& result) {
   add_seconds(next.report.seconds, report);
   if (!kept) {
     report.undo_stages(first, report.stages.size());
-    if (!ended_early(next.report.stop_reason)) return;
-    report.stop_reason = next.report.stop_reason;
-    report.explanation = std::move(next.report.explanation);
+    if (ended_early(next.report.stop_reason)) report.stop_reason = next.report.stop_reason;
+    report.explanation +=
+        formatted("; fitting the levels from %d on from that mesh gave nothing better: ", result.level + 1) +
+        next.report.explanation;
     return;
   }
   drop_warnings(audit(result.mesh).warnings, next.report);
@@ -136,11 +139,12 @@ FitResult FreedFit::run(const VolumeMesh& template_mesh) {
   FitResult result = fit_and_free(template_mesh, 0);
   while (can_go_on(result)) {
     const int level = result.level;
+    if (!clock_.in_time(formatted("level %d", level + 1), result.report)) break;
     try {
       go_on(result);
     } catch (const std::bad_alloc&) {
       result.report.stop_reason = StopReason::memory_limit;
-      result.report.explanation = "no memory was left to go on from the freed mesh";
+      result.report.explanation += "; no memory was left to go on from that mesh";
     }
     if (result.level == level) break;
   }

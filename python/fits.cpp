@@ -245,7 +245,7 @@ surface       what is to agree with the target: the cage's 'limit' surface, or t
 boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
 keep_cage     False: if the cage keeps cells below the quality, the points of the finest mesh are freed from it, and
-              the result has no cage
+              the result has no cage, unless a fit that went on from it ends with one
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
 
 With order, 1 .. 16, curved cells:

@@ -25,10 +25,12 @@ struct EdgeCrispness {
 
   /// True for parts as they are designed, whose edges must stay. The bends of scans and sculptures exceed any angle in
   /// places, but their surroundings bend nearly as much, and are not planar; parts with many rounded edges have much
-  /// longer crisp ones, and edges at planes. Of 184 surfaces, the scans have a crisp share of less than 0.5, a relative
-  /// length of less than 1, or at most 0.95 in the first sum (1.01 with the rim of a hole that was covered), but for two
-  /// coarse meshes of animals, and at most 1.24 in the second one. The parts have at least 0.51, 2.0 and 1.07, or 1.56 in
-  /// the second sum.
+  /// longer crisp ones, and edges at planes. Figures of 184 surfaces:
+  ///
+  /// - Scans have a crisp share of less than 0.5, a relative length of less than 1, or at most 0.95 in the first sum.
+  ///   One has 1.01, because of the rim of a covered hole, and two coarse meshes of animals have more. They have at most
+  ///   1.24 in the second sum.
+  /// - Parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
     // Relative length that counts as much as a crisp share of 1, and the factor on the planar share.
     constexpr double kLong = 15, kOfPlanes = 2;

@@ -26,7 +26,8 @@ LevelSamples samples_of(const VolumeMesh& mesh);
 /// Returns those of its boundary and its interfaces, in the same way.
 LevelSamples samples_of_sheets(const VolumeMesh& mesh);
 
-/// Returns the samples of the surface of a cage's mesh, and of its interfaces (`FitLevel`). The degrees of freedom are the cage's vertices.
+/// Returns the samples of the surface of a cage's mesh, and of its interfaces (`FitLevel`). The degrees of freedom are
+/// the cage's vertices.
 LevelSamples samples_of(const FittedCage& cage);
 
 }  // namespace subvol::internal

@@ -12,7 +12,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace subvol::internal {
@@ -149,35 +150,50 @@ bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> fac
   return true;
 }
 
-/// Moves the vertices of a mesh so that its regions get their volumes; see `restore_volumes`.
-/// follow  called after each move with the positions before it; may change those of the mesh.
-/// rounds  steps at most.
-bool restore_by_moves(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian, int rounds,
-                      const std::function<void(const std::vector<Vec3>&)>& follow) {
+/// Returns the largest relative difference of a region's volume, and what the volumes lack.
+std::pair<double, Eigen::VectorXd> volume_errors(const VolumeMesh& mesh, std::span<const double> wanted) {
+  const std::vector<double> now = region_volumes(mesh);
+  Eigen::VectorXd missing(static_cast<Eigen::Index>(wanted.size()));
+  double largest = 0;
+  for (std::size_t r = 0; r < wanted.size(); ++r) {
+    missing[static_cast<Eigen::Index>(r)] = wanted[r] - now[r];
+    largest = std::max(largest, std::abs(wanted[r] - now[r]) / wanted[r]);
+  }
+  return {largest, missing};
+}
+
+/// Moves the unknowns of a mesh so that its regions get their volumes; see `restore_volumes`. Each unknown moves as the
+/// vertex of the same number would. The state with the best volumes is kept.
+/// nodes   maps the unknowns to the mesh's vertices.
+/// rounds  moves at most.
+template <class Nodes>
+bool restore_by_moves(VolumeMesh mesh, std::span<const double> wanted, double least_jacobian, int rounds,
+                      const Nodes& nodes, std::vector<Vec3>& unknowns) {
   constexpr double kEnough = 1e-6;  // relative
   const MeshTopology topology(mesh);
   const std::vector<SheetFace> faces = sheet_faces(mesh, topology);
-  const auto num_regions = static_cast<Eigen::Index>(wanted.size());
-  const std::vector<Vec3> before = mesh.positions;
+  const std::vector<Vec3> before = unknowns;
   const QualityReport quality = measure_quality(mesh);
   const std::vector<Mat3> projectors = projectors_of(faces, mesh);
-  for (int round = 0; round < rounds; ++round) {
-    const std::vector<double> now = region_volumes(mesh);
-    Eigen::VectorXd missing(num_regions);
-    double worst = 0;
-    for (Eigen::Index r = 0; r < num_regions; ++r) {
-      missing[r] = wanted[static_cast<std::size_t>(r)] - now[static_cast<std::size_t>(r)];
-      worst = std::max(worst, std::abs(missing[r]) / wanted[static_cast<std::size_t>(r)]);
-    }
+  std::vector<Vec3> best = unknowns;
+  double least_error = std::numeric_limits<double>::infinity();
+  for (int round = 0; round <= rounds; ++round) {
+    const auto [error, missing] = volume_errors(mesh, wanted);
+    if (!(error < least_error)) break;
+    least_error = error;
+    best = unknowns;
     const std::vector<Vec3> start = mesh.positions;
-    if (worst < kEnough || !move_towards(missing, faces, projectors, mesh)) break;
-    follow(start);
+    if (error < kEnough || !move_towards(missing, faces, projectors, mesh)) break;
+    for (std::size_t v = 0; v < unknowns.size(); ++v) unknowns[v] += mesh.positions[v] - start[v];
+    mesh.positions = nodes(unknowns);
   }
+  unknowns = std::move(best);
+  mesh.positions = nodes(unknowns);
   const QualityReport after = measure_quality(mesh);
   bool good = after.certificate.not_certified.size() <= quality.certificate.not_certified.size();
   for (std::size_t c = 0; c < after.cell_minima.size() && good; ++c)
     good = after.cell_minima[c] >= std::min(least_jacobian, quality.cell_minima[c] - 1e-3);
-  if (!good) mesh.positions = before;
+  if (!good) unknowns = before;
   return good;
 }
 
@@ -185,20 +201,15 @@ bool restore_by_moves(VolumeMesh& mesh, std::span<const double> wanted, double l
 
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
   constexpr int kRounds = 6;  // of Newton's method
-  return restore_by_moves(mesh, wanted, least_jacobian, kRounds, [](const std::vector<Vec3>&) {});
+  return restore_by_moves(
+      mesh, wanted, least_jacobian, kRounds, [](const std::vector<Vec3>& x) { return x; }, mesh.positions);
 }
 
 bool restore_volumes(FittedCage& cage, std::span<const double> wanted, double least_jacobian) {
   constexpr int kRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
-  const std::vector<Vec3> before = cage.cage.positions;
-  VolumeMesh mesh = cage.mesh();
-  const bool good = restore_by_moves(mesh, wanted, least_jacobian, kRounds, [&](const std::vector<Vec3>& start) {
-    std::vector<Vec3>& x = cage.cage.positions;
-    for (std::size_t v = 0; v < x.size(); ++v) x[v] += mesh.positions[v] - start[v];
-    mesh.positions = cage.nodes();
-  });
-  if (!good) cage.cage.positions = before;
-  return good;
+  return restore_by_moves(
+      cage.mesh(), wanted, least_jacobian, kRounds,
+      [&](const std::vector<Vec3>& x) { return cage.level().nodes.apply(x); }, cage.cage.positions);
 }
 
 }  // namespace subvol::internal

@@ -52,8 +52,10 @@ struct FitOptions {
   double quality = kUsualQuality;
   /// If the cage does not let the cells reach the quality, the finest mesh is freed from it: all vertices of that mesh
   /// become degrees of freedom, and if that is not enough, it gets a layer of cells inside its boundary
-  /// (`internal::free_mesh`). The result then has no cage. Without effect for points, for templates of several regions
-  /// and if borders between groups are kept; not with cage_only or keep_states.
+  /// (`internal::free_mesh`). The result then has no cage. If the fit stalled at a lower level, the freed mesh becomes
+  /// the template of the levels that are left; the result has a cage if that fit ends with good cells. Without effect
+  /// for points, for templates of several regions and if borders between groups are kept; not with cage_only or
+  /// keep_states.
   bool frees_mesh = false;
   SolveControl control{};
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit

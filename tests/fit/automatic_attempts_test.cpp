@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_attempts.h"
+#include "subvol/templates/auto_template.h"
 
 #include <catch2/catch.hpp>
 
@@ -22,6 +23,15 @@ TEST_CASE("Attempts have more and more cells, and edges are followed on grids th
     CHECK(edges[i].is_last_count == (i + 2 >= edges.size()));
   }
   CHECK(attempts_of({.cells = 7000}, true).front().template_cells == 7000);
+}
+
+TEST_CASE("Cages are tried with up to the largest number of cells, and no template twice") {
+  const std::vector<AutomaticAttempt> once = attempts_of({.makes_cage = true}, false);
+  REQUIRE(once.size() == kAutomaticCells.size() + 1);
+  CHECK(once.back().template_cells == kMostAutomaticCells / 8);
+  CHECK(attempts_of({.makes_cage = true, .levels = 6}, false).size() == 1);
+  CHECK(cells_before(64, 1) == 8);
+  CHECK(cells_before(64, 6) == kLeastTemplateCells);
 }
 
 TEST_CASE("The work of attempts is forecast from the distances of the best trial") {

@@ -74,7 +74,7 @@ TEST_CASE("A cage with regions has their volumes, and flat interfaces stay flat"
     REQUIRE(surface);
     const bool is_flat = surface->regions.size() == 3;
     const AutomaticFitResult result = fitted(
-        *surface, {.cells = std::size_t(is_flat ? 4000 : 12000), .makes_cage = true}, is_flat ? 0.99 : 0.4, 1e-3);
+        *surface, {.cells = std::size_t(is_flat ? 4000 : 12000), .makes_cage = true}, is_flat ? 0.99 : 0.5, 1e-3);
     const AutomaticFitTrial& best = result.trials[result.chosen];
     CHECK(best.max_percent < (is_flat ? 1e-6 : 1.0));
     REQUIRE(result.cage.num_cells() * 8 == result.mesh.num_cells());
@@ -86,6 +86,23 @@ TEST_CASE("A cage with regions has their volumes, and flat interfaces stay flat"
       difference = std::max(difference, (again[v] - result.mesh.positions[v]).norm());
     CHECK(difference < 1e-9);
   }
+}
+
+TEST_CASE("A cage of a ball in a box follows the box's edges, and keeps both volumes", "[regions][slow]") {
+  const TriangleMesh target = together(box_surface({-1, -1, -1}, {1, 1, 1}), ball_surface({0, 0, 0}, 0.6, 3));
+  const auto surface = find_regions(target, RegionRule::keep);
+  REQUIRE(surface);
+  AutomaticFitOptions options{.makes_cage = true, .keep_states = true};
+  const AutomaticFitResult result = fitted(*surface, options, 0.5, 1e-3);
+  REQUIRE(result.report.creases);
+  CHECK(result.report.creases->within_share() > 0.99);
+  CHECK(result.mesh.face_groups.groups.size() == result.cage.face_groups.groups.size());
+  REQUIRE(!result.states.empty());
+  for (const FitState& state : result.states) CHECK(state.positions.size() == result.cage.num_vertices());
+  options.control.progress = [](const FitProgress& progress) { return progress.fraction < 0.3; };
+  const AutomaticFitResult cancelled = fit_regions(*surface, options);
+  CHECK(cancelled.report.stop_reason == StopReason::cancelled);
+  CHECK(cancelled.mesh.num_cells() == 8 * cancelled.cage.num_cells());
 }
 
 TEST_CASE("A ball in a box keeps the box's edges, and both volumes", "[regions][slow]") {

@@ -47,6 +47,11 @@ void append(TriangleMesh& mesh, const TriangleMesh& other) {
 
 }  // namespace
 
+TEST_CASE("A scan with a covered hole is no designed part") {
+  CHECK_FALSE(EdgeCrispness{.crisp_share = 0.77, .relative_length = 3.64}.is_designed());
+  CHECK(EdgeCrispness{.crisp_share = 0.77, .relative_length = 4.5}.is_designed());
+}
+
 TEST_CASE("edges of parts are followed, bends of rough surfaces are not") {
   const TriangleMesh cube = cube_surface(2, false);
   CHECK(has_edges_to_follow(cube, 40, false));
