@@ -246,16 +246,21 @@ VolumeFaceGroups with_carried_groups(const TriangleMesh& target, std::vector<Ind
   VolumeFaceGroups groups = groups_from_boundary(target.face_groups.groups, topology, carried);
   if (own.empty()) return groups;
   VolumeFaceGroups rest;
-  std::vector<Index> place(own.groups.size(), kNoIndex);  // of each own group that is left
+  std::vector<char> is_left(own.groups.size(), 0);
   for (const GroupedFace& entry : own.faces) {
     const std::span<const Index> corners(entry.face.data(), entry.face.back() == kNoIndex ? 3 : 4);
     if (group_of(groups, corners) != kNoIndex) continue;
-    if (place[entry.group] == kNoIndex) {
-      place[entry.group] = static_cast<Index>(rest.groups.size());
-      rest.groups.push_back(own.groups[entry.group]);
-    }
-    rest.faces.push_back({entry.face, place[entry.group]});
+    rest.faces.push_back(entry);
+    is_left[entry.group] = 1;
   }
+  // In the order of the own groups, so that the groups of a cage and of its mesh get the same numbers.
+  std::vector<Index> place(own.groups.size(), kNoIndex);
+  for (std::size_t g = 0; g < own.groups.size(); ++g) {
+    if (!is_left[g]) continue;
+    place[g] = static_cast<Index>(rest.groups.size());
+    rest.groups.push_back(own.groups[g]);
+  }
+  for (GroupedFace& entry : rest.faces) entry.group = place[entry.group];
   append_groups(groups, rest, 0);
   return groups;
 }
