@@ -135,9 +135,11 @@ std::optional<MeshState> MeshFreeing::optimize(VolumeMesh& mesh, double distance
   return ended ? std::nullopt : std::optional(now);
 }
 
-/// Returns true if the finest level, which the cage could not reach, is reached by the freed mesh.
+/// Returns true if the finest level, which the cage could not reach, is reached by the freed mesh. Not if the number of
+/// steps was limited: then it may be the steps that were too few.
 bool MeshFreeing::reaches_the_finest_level() const {
-  return result_.report.stop_reason == StopReason::stalled && result_.level == options_.levels && best_.is_valid() &&
+  return options_.control.max_iterations == 0 && result_.report.stop_reason == StopReason::stalled &&
+         result_.level == options_.levels && best_.is_valid() &&
          best_.mean_percent <= kReachedShare * best_.face_percent;
 }
 

@@ -50,7 +50,7 @@ bool can_be_freed(const VolumeMesh& template_mesh, const FitOptions& options);
 ///          cells if there is none.
 /// result   of a fit; nothing is done if a limit or the caller ended it. If it stalled, its mesh is that of the level
 ///          that could not be reached. If that was the finest one, and the freed mesh is valid and close to the target,
-///          the fit counts as done.
+///          the fit counts as done, unless the number of steps was limited.
 /// If memory runs out, what was kept before is the result, with the stop reason `memory_limit`.
 void free_mesh(const TriangleMesh& target, const FitOptions& options, const VolumeMesh& lifted, FitResult& result);
 
