@@ -135,8 +135,8 @@ std::optional<MeshState> MeshFreeing::optimize(VolumeMesh& mesh, double distance
   return ended ? std::nullopt : std::optional(now);
 }
 
-/// Returns true if the finest level, which the cage could not reach, is reached by the freed mesh. Not if the number of
-/// steps was limited: then it may be the steps that were too few.
+/// Returns true if the finest level, which the cage could not reach, is reached by the freed mesh. Returns
+/// false if the number of steps was limited, because the cage may have needed more steps.
 bool MeshFreeing::reaches_the_finest_level() const {
   return options_.control.max_iterations == 0 && result_.report.stop_reason == StopReason::stalled &&
          result_.level == options_.levels && best_.is_valid() &&

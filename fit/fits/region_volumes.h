@@ -19,7 +19,7 @@ namespace subvol::internal {
 ///
 /// wanted   volumes, ascending by reference (`region_volumes`), > 0.
 /// returns  false, with the mesh as it was, if a cell would lose its certificate, or a cell that is poorer than
-///          `least_jacobian` would become poorer; or if no such move exists.
+///          `least_jacobian` would become poorer. True if there is no such move; the mesh is then as it was, too.
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian);
 
 /// Does the same for the mesh of a cage. Each vertex of the cage makes the move d_v of the mesh's vertex of the same
