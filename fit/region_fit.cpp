@@ -257,8 +257,8 @@ double RegionFit::volume_percent() const {
   return largest;
 }
 
-/// Makes flat sheets of the present cage exactly so, unless its mesh loses certificates or becomes poorer than both
-/// before and this.
+/// Makes flat sheets of the present cage exactly so. Goes back if a cell of its mesh loses its certificate, or if the
+/// least scaled Jacobian falls and is below `least_jacobian`.
 void RegionFit::flatten_cage(double least_jacobian) {
   const std::vector<Vec3> before = cage_->cage.positions;
   const QualityReport quality = measure_quality(mesh_);
