@@ -177,7 +177,10 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
   }
   // Flattening a relaxed place could make its faces meet again. The rest of that mesh is flat from the trial before.
   if (follows_.any() && !trial.relaxed_at) {
-    flatten_faces(cage_ ? cage_->cage : mesh_, target_.mesh, *target_.tree, facets_);
+    if (cage_)
+      flatten_faces(*cage_, target_.mesh, *target_.tree, facets_);
+    else
+      flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
     follow_cage();
   }
   const QualityReport quality = measure_quality(mesh_);

@@ -80,7 +80,6 @@ class RegionFit : AutomaticDriver {
   void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
   double volume_percent() const;
   void make_exact(bool is_relaxed);
-  void flatten_cage(double least_jacobian);
   std::optional<CreaseDistance> distance_of_curves() const;
   /// Where sheets meet in curves, cells gain quality if the curves leave the planes of flat sheets: with the distance
   /// allowed as the aim, those of 19-wavy were 0.5 % of the diagonal off, with this one 0.02 %, at a least scaled
@@ -257,21 +256,6 @@ double RegionFit::volume_percent() const {
   return largest;
 }
 
-/// Makes flat sheets of the present cage exactly so. Goes back if a cell of its mesh loses its certificate, or if the
-/// least scaled Jacobian falls and is below `least_jacobian`.
-void RegionFit::flatten_cage(double least_jacobian) {
-  const std::vector<Vec3> before = cage_->cage.positions;
-  const QualityReport quality = measure_quality(mesh_);
-  flatten_sheets(cage_->cage, target_, least_jacobian);
-  follow_cage();
-  const QualityReport after = measure_quality(mesh_);
-  if (after.certificate.not_certified.size() <= quality.certificate.not_certified.size() &&
-      after.min_scaled_jacobian >= std::min(least_jacobian, quality.min_scaled_jacobian))
-    return;
-  cage_->cage.positions = before;
-  follow_cage();
-}
-
 /// Makes flat sheets of the present mesh exactly so, and gives its regions the volumes of the target's, unless cells
 /// become too poor.
 void RegionFit::make_exact(bool is_relaxed) {
@@ -279,7 +263,7 @@ void RegionFit::make_exact(bool is_relaxed) {
   constexpr double kLeastAfterFlattening = 0.45, kLeastAfterVolumes = 0.3;
   const bool flattens = follows_edges_ && !is_relaxed;
   if (cage_) {
-    if (flattens) flatten_cage(kLeastAfterFlattening);
+    if (flattens) flatten_sheets(*cage_, target_, kLeastAfterFlattening);
     restore_volumes(*cage_, unit_.volumes, kLeastAfterVolumes);
     follow_cage();
   } else {

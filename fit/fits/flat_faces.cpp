@@ -90,7 +90,9 @@ std::optional<Vec3> way_to_planes(const Vec3& p, std::span<const Index> list, co
   return way;
 }
 
-std::vector<double> shortest_edges(const VolumeMesh& mesh, const MeshTopology& topology) {
+/// Returns the length of the shortest edge at each vertex.
+std::vector<double> shortest_edges(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
   std::vector<double> shortest(mesh.num_vertices(), std::numeric_limits<double>::infinity());
   for (std::size_t e = 0; e < topology.num_edges(); ++e) {
     const auto& [a, b] = topology.edge(static_cast<Index>(e));
@@ -100,37 +102,79 @@ std::vector<double> shortest_edges(const VolumeMesh& mesh, const MeshTopology& t
   return shortest;
 }
 
+/// What is made flat: a mesh whose own cells are judged, or a cage, of whose mesh they are.
+class Flattened {
+ public:
+  explicit Flattened(VolumeMesh& mesh) : moved(mesh) {}
+  explicit Flattened(FittedCage& cage) : moved(cage.cage), cage_(&cage) {}
+
+  VolumeMesh& moved;  ///< the mesh whose vertices move
+
+  /// Returns the mesh whose cells are judged. Vertex v of a cage is vertex v of its mesh.
+  VolumeMesh judged() const { return cage_ ? cage_->mesh() : moved; }
+
+  /// Returns the lengths that moves are compared with: each vertex's shortest edge in the judged mesh, twice that if
+  /// two of these make an edge of the cage.
+  std::vector<double> sizes() const {
+    std::vector<double> sizes = shortest_edges(judged());
+    if (cage_)
+      for (double& size : sizes) size *= 2;
+    return sizes;
+  }
+
+  /// Puts the vertices of a judged cell back. Of a cage, they are those of the cell that it is a part of, and if these
+  /// have not moved, all that move it.
+  void put_back(Index cell, std::span<const Vec3> before) {
+    const auto c = static_cast<std::size_t>(cell);
+    if (put_back(moved.cell(cage_ ? c / kChildren : c), before) || !cage_) return;
+    const FitLevel& level = cage_->level();
+    for (const Index v : level.mesh.cell(c)) put_back(level.nodes.row_columns(v), before);
+  }
+
+ private:
+  /// Returns whether one of these vertices had moved.
+  bool put_back(std::span<const Index> vertices, std::span<const Vec3> before) {
+    bool had_moved = false;
+    for (const Index v : vertices) {
+      had_moved = had_moved || moved.positions[v] != before[v];
+      moved.positions[v] = before[v];
+    }
+    return had_moved;
+  }
+
+  FittedCage* cage_ = nullptr;
+};
+
 /// Puts vertices of cells that have suffered back: that are poorer than before and than `least`. Returns false if there
 /// are none.
-bool put_back(VolumeMesh& mesh, std::span<const Vec3> before, const QualityReport& quality_before, double least) {
-  const QualityReport now = measure_quality(mesh);
+bool put_back(Flattened& flattened, std::span<const Vec3> before, const QualityReport& quality_before, double least) {
+  const QualityReport now = measure_quality(flattened.judged());
   std::vector<Index> bad = now.certificate.not_certified;
   const auto& known = quality_before.certificate.not_certified;
   std::erase_if(bad, [&](Index c) { return std::binary_search(known.begin(), known.end(), c); });
   for (std::size_t c = 0; c < now.cell_minima.size(); ++c)
-    if (now.cell_minima[c] < std::min(quality_before.cell_minima[c], least))
-      bad.push_back(static_cast<Index>(c));
-  for (const Index c : bad)
-    for (const Index v : mesh.cell(static_cast<std::size_t>(c))) mesh.positions[v] = before[v];
+    if (now.cell_minima[c] < std::min(quality_before.cell_minima[c], least)) bad.push_back(static_cast<Index>(c));
+  for (const Index c : bad) flattened.put_back(c, before);
   return !bad.empty();
 }
 
 /// Moves vertices into their planes, as far as cells allow. tolerance: distance from a plane that counts as in it.
-std::size_t flatten(VolumeMesh& mesh, const MeshTopology& topology, std::span<const Index> group,
+std::size_t flatten(Flattened flattened, const MeshTopology& topology, std::span<const Index> group,
                     const Closest& closest, const FlatFacets& facets, double tolerance, double least_jacobian) {
-  constexpr double kLongest = 0.1;  // of the shortest edge
+  constexpr double kLongest = 0.1;  // of a vertex's size
   constexpr int kMostRounds = 20;   // each puts more vertices back; then all are
+  VolumeMesh& mesh = flattened.moved;
   const std::vector<std::vector<Index>> wanted = facets_of_vertices(mesh, topology, group, closest, facets);
-  const std::vector<double> shortest = shortest_edges(mesh, topology);
+  const std::vector<double> sizes = flattened.sizes();
   const std::vector<Vec3> before = mesh.positions;
-  const QualityReport quality = measure_quality(mesh);
+  const QualityReport quality = measure_quality(flattened.judged());
   for (std::size_t v = 0; v < wanted.size(); ++v) {
     if (wanted[v].empty()) continue;
     const std::optional<Vec3> way = way_to_planes(before[v], wanted[v], facets, tolerance);
-    if (way && way->norm() <= kLongest * shortest[v]) mesh.positions[v] += *way;
+    if (way && way->norm() <= kLongest * sizes[v]) mesh.positions[v] += *way;
   }
   int round = 0;
-  while (put_back(mesh, before, quality, std::min(quality.min_scaled_jacobian, least_jacobian)))
+  while (put_back(flattened, before, quality, std::min(quality.min_scaled_jacobian, least_jacobian)))
     if (++round == kMostRounds) {
       mesh.positions = before;
       break;
@@ -149,20 +193,19 @@ std::vector<Index> boundary_group(const MeshTopology& topology) {
   return group;
 }
 
-}  // namespace
-
-std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
-                          const FlatFacets& facets) {
-  const MeshTopology topology(mesh);
-  return flatten(mesh, topology, boundary_group(topology),
-                 [&](const Vec3& point, Index, Index hint) { return tree.closest(point, hint); }, facets,
-                 kFlatTolerance * bounding_box_diagonal(target), 1);
+std::size_t flatten_boundary(Flattened flattened, const TriangleMesh& target, const ClosestPoint& tree,
+                             const FlatFacets& facets) {
+  const MeshTopology topology(flattened.moved);
+  return flatten(
+      flattened, topology, boundary_group(topology),
+      [&](const Vec3& point, Index, Index hint) { return tree.closest(point, hint); }, facets,
+      kFlatTolerance * bounding_box_diagonal(target), 1);
 }
 
-std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian) {
+std::size_t flatten_all(Flattened flattened, const FitTarget& target, double least_jacobian) {
   FlatFacets facets = flat_facets(target.mesh);
-  if (!target.has_interfaces()) return flatten_faces(mesh, target.mesh, *target.tree, facets);
-  const MeshTopology topology(mesh);
+  if (!target.has_interfaces()) return flatten_boundary(flattened, target.mesh, *target.tree, facets);
+  const MeshTopology topology(flattened.moved);
   const FlatFacets inner = flat_facets(target.interfaces);
   const auto first_plane = static_cast<Index>(facets.planes.size());
   const auto first_triangle = static_cast<Index>(facets.of_triangle.size());
@@ -175,8 +218,28 @@ std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double lea
     if (hit.triangle != kNoIndex) hit.triangle += first_triangle;
     return hit;
   };
-  return flatten(mesh, topology, groups_of_sheets(mesh, topology), closest, facets,
+  return flatten(flattened, topology, groups_of_sheets(flattened.moved, topology), closest, facets,
                  kFlatTolerance * bounding_box_diagonal(target.mesh), least_jacobian);
+}
+
+}  // namespace
+
+std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
+                          const FlatFacets& facets) {
+  return flatten_boundary(Flattened(mesh), target, tree, facets);
+}
+
+std::size_t flatten_faces(FittedCage& cage, const TriangleMesh& target, const ClosestPoint& tree,
+                          const FlatFacets& facets) {
+  return flatten_boundary(Flattened(cage), target, tree, facets);
+}
+
+std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian) {
+  return flatten_all(Flattened(mesh), target, least_jacobian);
+}
+
+std::size_t flatten_sheets(FittedCage& cage, const FitTarget& target, double least_jacobian) {
+  return flatten_all(Flattened(cage), target, least_jacobian);
 }
 
 std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target) {
@@ -222,8 +285,8 @@ std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target)
   std::size_t moved = 0;
   for (std::size_t v = 0; v < wanted.size(); ++v) {
     if (wanted[v].empty()) continue;
-    const auto way = way_to_planes(cage.positions[v], wanted[v], facets,
-                                   kFlatTolerance * bounding_box_diagonal(target.mesh));
+    const auto way =
+        way_to_planes(cage.positions[v], wanted[v], facets, kFlatTolerance * bounding_box_diagonal(target.mesh));
     if (!way) continue;
     cage.positions[v] += *way;
     ++moved;

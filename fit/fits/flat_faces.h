@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -24,12 +25,17 @@ namespace subvol::internal {
 /// a cell would lose its certificate, or become poorer than the poorest cell of the mesh was, the vertices of that cell
 /// stay, too.
 ///
-/// mesh    passes `validate` except for unused vertices and inverted cells; its boundary lies close to the target. If
-///         it is a cage, the subdivision surface becomes flat where its control vertices are.
+/// mesh    passes `validate` except for unused vertices and inverted cells; its boundary lies close to the target
 /// target  oriented outward or inward as a whole; tree and facets: its own.
 /// returns the number of vertices that lie on planes afterwards. Same bits for any number of threads.
 /// Cost: five closest points for each boundary face, and the quality of the mesh some times.
 std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
+                          const FlatFacets& facets);
+
+/// Does the same for the vertices of a cage, whose subdivision surface becomes flat where they are. The cells of its
+/// mesh are judged, and moves are compared with twice the edges of the mesh, because cells of a cage are often flat, and
+/// its edges short, if the mesh is good. If a cell suffers, vertices of the cage that move it stay.
+std::size_t flatten_faces(FittedCage& cage, const TriangleMesh& target, const ClosestPoint& tree,
                           const FlatFacets& facets);
 
 /// Does the same for the boundary and for the interfaces between regions: vertices that lie in both satisfy the planes
@@ -37,6 +43,7 @@ std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const Cl
 ///
 /// target  with the interfaces that the mesh is to keep; the mesh is in its coordinates.
 std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian);
+std::size_t flatten_sheets(FittedCage& cage, const FitTarget& target, double least_jacobian);
 
 /// Moves the control vertices of flat interfaces into their planes, so that their subdivision surfaces are flat, up to
 /// rounding: those of each patch of interface faces between creases and feature curves that lies on one flat facet of

@@ -4,6 +4,7 @@
 #include "subvol/fit/features/flat_facets.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "tests/support/feature_fixtures.h"
 #include "tests/support/mesh_checks.h"
@@ -12,7 +13,10 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <functional>
 #include <random>
+#include <utility>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -80,4 +84,31 @@ TEST_CASE("flat faces: what is far from the target, or curved, stays where it is
   const std::vector<Vec3> round_before = round.positions;
   CHECK(flatten(round, cube_surface(12, true)) == 0);
   CHECK(round.positions == round_before);
+}
+
+TEST_CASE("flat faces: a cage is judged by the cells of its mesh, not by its own") {
+  constexpr int kCells = 4;
+  constexpr double kSharp = 40, kOff = 1e-3;
+  VolumeMesh control = centered_lattice(kCells);
+  control.tags = features_by_angle(control, kSharp);
+  FittedCage cage(std::move(control));
+  const auto at = [&](const Vec3& place) {
+    return static_cast<std::size_t>(
+        std::ranges::min_element(cage.cage.positions, std::less{}, [&](const Vec3& p) { return (p - place).norm(); }) -
+        cage.cage.positions.begin());
+  };
+  // An edge of the cage is as short as the way to the plane, and vanishes there. The cells of the mesh stay good.
+  const std::size_t center = at({0, 0, 1}), below = at({0, 0, 0.5});
+  cage.cage.positions[below] = Vec3(0, 0, 1);
+  cage.cage.positions[center].z() += kOff;
+  VolumeMesh alone = cage.cage;
+  const TriangleMesh target = cube_surface(kCells, false);
+  const ClosestPoint tree(target);
+  const double least = measure_quality(cage.mesh()).min_scaled_jacobian;
+  REQUIRE(least > 0.3);
+  const std::size_t boundary = 6 * kCells * kCells + 2;
+  CHECK(flatten_faces(alone, target, tree, flat_facets(target)) < boundary);
+  CHECK(flatten_faces(cage, target, tree, flat_facets(target)) == boundary);
+  CHECK(cage.cage.positions[center].z() == Approx(1).epsilon(1e-14));
+  CHECK(measure_quality(cage.mesh()).min_scaled_jacobian >= least);
 }
