@@ -21,7 +21,7 @@ using namespace subvol::internal;
 
 namespace {
 
-constexpr int kPasses = 5, kLeastPoints = 5;
+constexpr int kLeastTimedPasses = 5, kLeastPoints = 5;
 constexpr double kLeastMicroseconds = 3e5;  // of all passes over a mesh: few cells take more of them
 
 template <class Work>
@@ -37,7 +37,7 @@ void measure(const char* path, bool last) {
   HighOrderCertifier certifier(mesh.space);
   double first = 0, later = 1e300, total = 0;
   std::size_t boxes = 0, not_valid = 0;
-  for (int pass = 0; pass < kPasses || total < kLeastMicroseconds; ++pass) {
+  for (int pass = 0; pass < kLeastTimedPasses || total < kLeastMicroseconds; ++pass) {
     boxes = not_valid = 0;
     const double time = processor_microseconds([&] {
       for (std::size_t c = 0; c < num_cells; ++c) {
@@ -57,7 +57,7 @@ void measure(const char* path, bool last) {
   std::vector<Vec3> gradient(mesh.coefficients.size(), Vec3::Zero());
   double gradient_time = 1e300;
   total = 0;
-  for (int pass = 0; pass < kPasses || total < kLeastMicroseconds; ++pass) {
+  for (int pass = 0; pass < kLeastTimedPasses || total < kLeastMicroseconds; ++pass) {
     const double time = processor_microseconds([&] { energy.add_gradient(mesh.coefficients, 1, gradient); });
     total += time;
     gradient_time = std::min(gradient_time, time);

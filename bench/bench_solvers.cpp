@@ -29,8 +29,8 @@ using namespace subvol::internal;
 
 namespace {
 
-constexpr double kLambda = 0.05, kNear = 1.01;
-constexpr int kIntervals = 16, kMaxSteps = 2000;
+constexpr double kLastStageLambda = 0.05, kNearLeastEnergyRatio = 1.01;
+constexpr int kBoundarySampleIntervals = 16, kMostMinimizerSteps = 2000;
 
 struct Run {
   std::vector<double> seconds, energies;  ///< after each step
@@ -51,9 +51,9 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
       identity_map(mesh.space.num_nodes()), samples.positions,
       std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
       make_surface_term(target.surface, samples.triangles, samples.points.size(),
-                        HighOrderSchedule().final_stage(kLambda).tangential_weight, Correspondence::closest,
+                        HighOrderSchedule().final_stage(kLastStageLambda).tangential_weight, Correspondence::closest,
                         SurfacePull::straight, 0, samples.at_edges),
-      kLambda);
+      kLastStageLambda);
   problem.tables.emplace(mesh.space, samples.points);
   return problem;
 }
@@ -62,12 +62,12 @@ template <class Minimizer>
 Run timed(Minimizer&& minimize, FitProblem problem, std::vector<Vec3> x) {
   Run run;
   MinimizerOptions options;
-  options.max_iterations = kMaxSteps;
+  options.max_iterations = kMostMinimizerSteps;
   options.relative_decrease = 1e-5;
   const std::clock_t start = std::clock();
   options.progress = [&](const IterationRecord& step) {
     run.seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-    run.energies.push_back(step.surface_energy + kLambda * step.volume_energy);
+    run.energies.push_back(step.surface_energy + kLastStageLambda * step.volume_energy);
     return true;
   };
   minimize(problem, x, options);
@@ -93,13 +93,13 @@ int main(int argc, char** argv) {
     if (i < mesh.space.num_vertices()) mesh.coefficients[i] -= target.normalization.center;
     mesh.coefficients[i] /= target.normalization.diagonal;
   }
-  const BoundarySamples samples = make_boundary_samples(mesh.space, kIntervals);
+  const BoundarySamples samples = make_boundary_samples(mesh.space, kBoundarySampleIntervals);
   target.sample(samples.points.size());
   const auto problem = [&] { return last_stage(mesh, sample.template_mesh, target, samples); };
   const Run newton = timed(minimize_newton, problem(), mesh.coefficients);
   const Run lbfgs = timed(minimize_lbfgs, problem(), mesh.coefficients);
 
-  const double near = kNear * std::min(newton.least(), lbfgs.least());
+  const double near = kNearLeastEnergyRatio * std::min(newton.least(), lbfgs.least());
   std::printf("{\"bench\": \"solvers\", \"order\": %d, \"unknowns\": %zu, \"rows\": [", order,
               mesh.coefficients.size());
   const auto print = [&](const char* name, const Run& run) {

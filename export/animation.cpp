@@ -48,10 +48,10 @@ Scene scene_of(const MovingSurface& surface, std::span<const FitState> states, c
 
 Scene animation_scene(const VolumeMesh& cage, std::span<const FitState> states, const SurfaceSceneOptions& options) {
   constexpr std::size_t kMostAnimatedQuads = 20'000;
-  constexpr int kMostRefinements = 4;  // of a cage of few faces
+  constexpr int kMostAnimationRefinements = 4;  // of a cage of few faces
   int refinements = 1;
   for (std::size_t quads = 16 * MeshTopology(cage).boundary_faces().size();
-       quads <= kMostAnimatedQuads && refinements < kMostRefinements; quads *= 4)
+       quads <= kMostAnimatedQuads && refinements < kMostAnimationRefinements; quads *= 4)
     ++refinements;
   BoundaryRefinement boundary = refine_boundary(cage, refinements);
   MovingSurface surface;

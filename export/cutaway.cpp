@@ -32,13 +32,14 @@ Vec3 center(const HighOrderMesh& mesh, std::size_t c) {
 
 /// Returns for each cell whether it stays: true if its center lies up to the plane.
 std::vector<char> kept_cells(const HighOrderMesh& mesh, const CutPlane& plane) {
-  constexpr double kRounding = 1e-9;  // share of the extent by which the centers of one layer may differ
+  constexpr double kLayerCenterTolerance = 1e-9;  // share of the extent by which the centers of one layer may differ
   Eigen::AlignedBox3d box, centers;
   for (std::size_t v = 0; v < mesh.space.num_vertices(); ++v) box.extend(mesh.coefficients[v]);
   for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) centers.extend(center(mesh, c));
   int axis = plane.axis;
-  if (axis == CutPlane::kShortest) box.sizes().minCoeff(&axis);
-  const double place = centers.min()[axis] + plane.share * centers.sizes()[axis] + kRounding * box.sizes()[axis];
+  if (axis == CutPlane::kShortestAxis) box.sizes().minCoeff(&axis);
+  const double place =
+      centers.min()[axis] + plane.share * centers.sizes()[axis] + kLayerCenterTolerance * box.sizes()[axis];
   std::vector<char> kept;
   for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) kept.push_back(center(mesh, c)[axis] <= place ? 1 : 0);
   return kept;
@@ -104,8 +105,8 @@ std::vector<Index> new_edges(const MeshTopology& topology, const std::vector<Ind
 }
 
 int intervals_of(const ElementSpace& space) {
-  constexpr int kLeastIntervals = 4, kIntervalsPerOrder = 2;
-  return space.max_order() == 1 ? 1 : std::max(kLeastIntervals, kIntervalsPerOrder * space.max_order());
+  constexpr int kLeastCutawayIntervals = 4, kCutawayIntervalsPerOrder = 2;
+  return space.max_order() == 1 ? 1 : std::max(kLeastCutawayIntervals, kCutawayIntervalsPerOrder * space.max_order());
 }
 
 }  // namespace
@@ -115,7 +116,7 @@ Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
   const MeshTopology& topology = mesh.space.topology();
   if (mesh.space.num_cells() == 0) throw InputError("cutaway: expected a mesh with cells");
   if (cell_minima.size() != mesh.space.num_cells()) throw InputError("cell_minima: expected one value per cell");
-  if (plane.axis < CutPlane::kShortest || plane.axis > 2) throw InputError("CutPlane::axis: expected 0, 1 or 2");
+  if (plane.axis < CutPlane::kShortestAxis || plane.axis > 2) throw InputError("CutPlane::axis: expected 0, 1 or 2");
   if (!(plane.share > 0 && plane.share < 1)) throw InputError("CutPlane::share: expected a number between 0 and 1");
   const bool shows_regions = regions.regions.size() > 1;
   if (shows_regions && regions.of_cell.size() != mesh.space.num_cells())

@@ -11,8 +11,8 @@ namespace subvol {
 /// Selects the cells to remove so that the inside becomes visible: those whose center lies beyond a plane perpendicular
 /// to an axis.
 struct CutPlane {
-  static constexpr int kShortest = -1;  ///< stands for the axis along which the mesh is shortest
-  int axis = kShortest;                 ///< 0, 1, 2, or kShortest, which gives the largest section
+  static constexpr int kShortestAxis = -1;  ///< stands for the axis along which the mesh is shortest
+  int axis = kShortestAxis;                 ///< 0, 1, 2, or kShortestAxis, which gives the largest section
   double share = 0.5;    ///< position between the lowest and the highest cell center, in (0, 1)
 };
 

@@ -122,7 +122,7 @@ class BufferWriter {
 
 std::vector<float> relative_positions(const std::vector<Vec3>& positions, const Placement& place,
                                       const Complaint& refuse) {
-  constexpr double kLeast = 1e-30;  // below it, single precision runs out of digits
+  constexpr double kLeastFloat32Size = 1e-30;  // below it, single precision runs out of digits
   std::vector<float> values;
   values.reserve(3 * positions.size());
   double largest = 0;
@@ -132,7 +132,7 @@ std::vector<float> relative_positions(const std::vector<Vec3>& positions, const 
       values.push_back(place.unit == 1 ? plain : static_cast<float>(x / place.unit));
       largest = std::max(largest, std::abs(x));
     }
-  if (largest > 0 && largest < kLeast) refuse("positions", "expected a size in the range of float32");
+  if (largest > 0 && largest < kLeastFloat32Size) refuse("positions", "expected a size in the range of float32");
   return values;
 }
 
@@ -182,12 +182,12 @@ void check_sizes(const ScenePrimitive& primitive, const Complaint& refuse) {
 int add_indices(BufferWriter& buffer, const ScenePrimitive& primitive, std::span<const Index> indices) {
   // The index 65535 restarts a primitive in some graphics interfaces, so glTF forbids it.
   constexpr std::size_t kMaxShortVertices = 65535;
-  constexpr int kTarget = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
+  constexpr int kIndexBufferTarget = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
   if (primitive.positions.size() <= kMaxShortVertices)
     return buffer.add(std::vector<std::uint16_t>(indices.begin(), indices.end()), 1,
-                      TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "indices");
-  return buffer.add(std::vector<std::uint32_t>(indices.begin(), indices.end()), 1,
-                    TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, kTarget, "indices");
+                      TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kIndexBufferTarget, "indices");
+  return buffer.add(std::vector<std::uint32_t>(indices.begin(), indices.end()), 1, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
+                    kIndexBufferTarget, "indices");
 }
 
 int add_material(gltf::Model& model, const SceneNode& node, const std::string& name, const Complaint& refuse) {
@@ -213,7 +213,7 @@ std::vector<float> differences(std::vector<float> to, const std::vector<float>& 
 /// Adds the shapes of a node as morph targets of its primitive.
 void add_shapes(gltf::Mesh& mesh, BufferWriter& buffer, const SceneNode& node, const Placement& place,
                 const Complaint& refuse) {
-  constexpr int kTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
+  constexpr int kVertexBufferTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
   const ScenePrimitive& rest = node.primitive;
   if (rest.topology != ScenePrimitive::Topology::triangles) refuse("shapes", "expected none of lines");
   const std::vector<float> positions = relative_positions(rest.positions, place, refuse);
@@ -224,11 +224,10 @@ void add_shapes(gltf::Mesh& mesh, BufferWriter& buffer, const SceneNode& node, c
       refuse("shape \"" + shape.name + "\"", "expected as many positions and normals as the primitive has");
     std::map<std::string, int> target;
     target["POSITION"] = buffer.add(differences(relative_positions(shape.positions, place, refuse), positions), 3,
-                                    kFloat, kTarget, shape.name + " positions", true);
+                                    kFloat, kVertexBufferTarget, shape.name + " positions", true);
     if (!normals.empty())
-      target["NORMAL"] =
-          buffer.add(differences(unit_normals(shape.normals, refuse), normals), 3, kFloat, kTarget,
-                     shape.name + " normals");
+      target["NORMAL"] = buffer.add(differences(unit_normals(shape.normals, refuse), normals), 3, kFloat,
+                                    kVertexBufferTarget, shape.name + " normals");
     mesh.primitives[0].targets.push_back(std::move(target));
     names.emplace_back(shape.name);
   }
@@ -260,25 +259,25 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
   const Complaint refuse{node.name};
   const ScenePrimitive& source = node.primitive;
   check_sizes(source, refuse);
-  constexpr int kTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
+  constexpr int kVertexBufferTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
   gltf::Primitive primitive;
   const std::vector<float> positions = relative_positions(source.positions, place, refuse);
   primitive.attributes["POSITION"] =
       place.quantize ? buffer.add_quantized<std::int16_t>(positions, TINYGLTF_COMPONENT_TYPE_SHORT, "positions", true)
-                     : buffer.add(positions, 3, kFloat, kTarget, "positions", true);
+                     : buffer.add(positions, 3, kFloat, kVertexBufferTarget, "positions", true);
   if (!source.normals.empty()) {
     const std::vector<float> normals = unit_normals(source.normals, refuse);
     primitive.attributes["NORMAL"] =
         place.quantize ? buffer.add_quantized<std::int8_t>(normals, TINYGLTF_COMPONENT_TYPE_BYTE, "normals", false)
-                       : buffer.add(normals, 3, kFloat, kTarget, "normals");
+                       : buffer.add(normals, 3, kFloat, kVertexBufferTarget, "normals");
   }
   if (!source.colors.empty())
     primitive.attributes["COLOR_0"] = buffer.add(color_words(source, refuse), 4, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT,
-                                                 kTarget, "colors", false, true);
+                                                 kVertexBufferTarget, "colors", false, true);
   for (const SceneAttribute& attribute : source.attributes) {
     std::vector<float> values;
     for (const double x : attribute.values) values.push_back(to_float(x, attribute.name, refuse));
-    primitive.attributes[attribute.name] = buffer.add(values, 1, kFloat, kTarget, attribute.name, true);
+    primitive.attributes[attribute.name] = buffer.add(values, 1, kFloat, kVertexBufferTarget, attribute.name, true);
   }
   primitive.mode =
       source.topology == ScenePrimitive::Topology::triangles ? TINYGLTF_MODE_TRIANGLES : TINYGLTF_MODE_LINE;

@@ -10,11 +10,11 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr const char* kNumbers = "subvol_group_numbers";
-constexpr const char* kDimensions = "subvol_group_dimensions";
-constexpr const char* kNames = "subvol_group_names";
-constexpr const char* kFaces = "subvol_group_faces";
-constexpr const char* kOfFaces = "subvol_group_of_faces";
+constexpr const char* kGroupNumbersField = "subvol_group_numbers";
+constexpr const char* kGroupDimensionsField = "subvol_group_dimensions";
+constexpr const char* kGroupNamesField = "subvol_group_names";
+constexpr const char* kGroupFacesField = "subvol_group_faces";
+constexpr const char* kGroupOfFacesField = "subvol_group_of_faces";
 
 template <class T>
 void append_field(std::string& text, const char* name, const std::vector<T>& values, std::size_t components = 1) {
@@ -41,15 +41,17 @@ std::vector<std::string> split_names(const std::vector<std::uint8_t>& bytes) {
 }
 
 void read_faces(const VtuArrays& file, std::size_t num_points, std::size_t num_groups, VolumeFaceGroups& groups) {
-  const auto points = file.get<std::int32_t>(kFaces), of_faces = file.get<std::int32_t>(kOfFaces);
-  if (points.size() != 4 * of_faces.size()) file.fail(std::string(kFaces) + ": expected four numbers for each face");
+  const auto points = file.get<std::int32_t>(kGroupFacesField), of_faces = file.get<std::int32_t>(kGroupOfFacesField);
+  if (points.size() != 4 * of_faces.size())
+    file.fail(std::string(kGroupFacesField) + ": expected four numbers for each face");
   for (std::size_t f = 0; f < of_faces.size(); ++f) {
     const std::size_t size = points[4 * f + 3] == kNoIndex ? 3 : 4;
     for (std::size_t k = 0; k < size; ++k)
       if (points[4 * f + k] < 0 || static_cast<std::size_t>(points[4 * f + k]) >= num_points)
-        file.fail(std::string(kFaces) + ": face " + std::to_string(f) + ": expected numbers of points");
+        file.fail(std::string(kGroupFacesField) + ": face " + std::to_string(f) + ": expected numbers of points");
     if (of_faces[f] < 0 || static_cast<std::size_t>(of_faces[f]) >= num_groups)
-      file.fail(std::string(kOfFaces) + ": face " + std::to_string(f) + ": expected the place of a group of faces");
+      file.fail(std::string(kGroupOfFacesField) + ": face " + std::to_string(f) +
+                ": expected the place of a group of faces");
     groups.faces.push_back({face_key({&points[4 * f], size}), of_faces[f]});
   }
   normalize(groups);
@@ -73,25 +75,25 @@ std::string group_data(const VolumeFaceGroups& groups, std::span<const Group> re
     of_faces.push_back(entry.group);
   }
   std::string text;
-  append_field(text, kNumbers, numbers);
-  append_field(text, kDimensions, dimensions);
-  append_field(text, kNames, names);
-  append_field(text, kFaces, points, 4);
-  append_field(text, kOfFaces, of_faces);
+  append_field(text, kGroupNumbersField, numbers);
+  append_field(text, kGroupDimensionsField, dimensions);
+  append_field(text, kGroupNamesField, names);
+  append_field(text, kGroupFacesField, points, 4);
+  append_field(text, kGroupOfFacesField, of_faces);
   return text;
 }
 
 FileGroups read_groups(const VtuArrays& file, std::size_t num_points) {
   FileGroups groups;
-  if (!file.has(kNumbers)) return groups;
-  const auto numbers = file.get<std::int32_t>(kNumbers);
-  const auto dimensions = file.get<std::uint8_t>(kDimensions);
-  const std::vector<std::string> names = split_names(file.get<std::uint8_t>(kNames));
+  if (!file.has(kGroupNumbersField)) return groups;
+  const auto numbers = file.get<std::int32_t>(kGroupNumbersField);
+  const auto dimensions = file.get<std::uint8_t>(kGroupDimensionsField);
+  const std::vector<std::string> names = split_names(file.get<std::uint8_t>(kGroupNamesField));
   if (dimensions.size() != numbers.size() || names.size() != numbers.size())
-    file.fail(std::string(kNumbers) + ": expected as many numbers, dimensions and names");
+    file.fail(std::string(kGroupNumbersField) + ": expected as many numbers, dimensions and names");
   for (std::size_t g = 0; g < numbers.size(); ++g) {
     if ((dimensions[g] != 2 && dimensions[g] != 3) || (dimensions[g] == 2 && !groups.regions.empty()))
-      file.fail(std::string(kDimensions) + ": expected 2 for groups of faces, then 3 for references");
+      file.fail(std::string(kGroupDimensionsField) + ": expected 2 for groups of faces, then 3 for references");
     (dimensions[g] == 2 ? groups.faces.groups : groups.regions).push_back({names[g], numbers[g], dimensions[g]});
   }
   read_faces(file, num_points, groups.faces.groups.size(), groups.faces);

@@ -17,7 +17,7 @@ namespace {
 
 /// Largest difference between the curves that two cells give a common edge or face, as a share of a cell's extent: far
 /// above the rounding of files of single precision (6e-8), far below what a curve is made for.
-constexpr double kMostGap = 1e-6;
+constexpr double kMostSharedCurveGap = 1e-6;
 
 /// Maps values at the nodes of one kind and order to coefficients of the modes of a cell.
 class Interpolation {
@@ -187,7 +187,7 @@ HighOrderMesh joined_polynomials(const CellView& cells, const VolumeMesh& corner
   interpolate(cells, ordering, spacing, space, [&](std::size_t c, const Eigen::MatrixX3d& found) {
     const auto into = space.nodes(c);
     const auto signs = space.signs(c);
-    const double most = kMostGap * extent(cells, c);
+    const double most = kMostSharedCurveGap * extent(cells, c);
     for (std::size_t a = 0; a < into.size(); ++a) {
       const Index node = into[a];
       if (static_cast<std::size_t>(node) < space.num_vertices()) continue;

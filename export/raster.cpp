@@ -13,7 +13,7 @@
 namespace subvol {
 namespace {
 
-constexpr int kSamples = 2;  ///< per pixel, in each direction
+constexpr int kPixelSideSamples = 2;  ///< per pixel, in each direction
 constexpr LinearColor kGray{0.35, 0.40, 0.45, 1};
 constexpr double kAmbient = 0.3;     // share of the light that comes from everywhere
 constexpr double kWireShade = 0.35;  ///< factor on the surface's color
@@ -27,8 +27,8 @@ double srgb(double linear) {
 class Canvas {
  public:
   Canvas(const RasterView& view, int width, int height)
-      : width_(width * kSamples),
-        height_(height * kSamples),
+      : width_(width * kPixelSideSamples),
+        height_(height * kPixelSideSamples),
         scale_(std::min(width_, height_) / (2 * view.radius)),
         center_(view.center),
         depths_(static_cast<std::size_t>(width_) * height_, -std::numeric_limits<double>::infinity()),
@@ -54,8 +54,8 @@ class Canvas {
   }
 
   void draw_triangle(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& color) {
-    constexpr double kOnEdge = 1e-9;  // samples on an edge belong to both triangles; otherwise rounding could leave
-                                      // them to neither
+    constexpr double kTriangleEdgeTolerance = 1e-9;  // samples on an edge belong to both triangles; otherwise rounding
+                                                     // could leave them to neither
     const double area = (p[1] - p[0]).head<2>().x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
     if (!(std::abs(area) > 0) || !std::isfinite(area)) return;
     const auto range = [](double low, double high, int limit) {
@@ -71,7 +71,7 @@ class Canvas {
         const double dx = x + 0.5 - p[0].x(), dy = y + 0.5 - p[0].y();
         const double s = (dx * (p[2] - p[0]).y() - dy * (p[2] - p[0]).x()) / area;
         const double t = (dy * (p[1] - p[0]).x() - dx * (p[1] - p[0]).y()) / area;
-        if (s < -kOnEdge || t < -kOnEdge || s + t > 1 + kOnEdge) continue;
+        if (s < -kTriangleEdgeTolerance || t < -kTriangleEdgeTolerance || s + t > 1 + kTriangleEdgeTolerance) continue;
         put(x, y, (1 - s - t) * p[0].z() + s * p[1].z() + t * p[2].z(),
             (1 - s - t) * color[0] + s * color[1] + t * color[2]);
       }
@@ -93,14 +93,15 @@ class Canvas {
   }
 
   Image image() const {
-    Image image{width_ / kSamples, height_ / kSamples, {}};
-    image.pixels.reserve(4 * depths_.size() / (kSamples * kSamples));
+    Image image{width_ / kPixelSideSamples, height_ / kPixelSideSamples, {}};
+    image.pixels.reserve(4 * depths_.size() / (kPixelSideSamples * kPixelSideSamples));
     for (int y = 0; y < image.height; ++y)
       for (int x = 0; x < image.width; ++x) {
         Vec3 sum = Vec3::Zero();
         int covered = 0;
-        for (int k = 0; k < kSamples * kSamples; ++k) {
-          const std::size_t i = index(kSamples * x + k % kSamples, kSamples * y + k / kSamples);
+        for (int k = 0; k < kPixelSideSamples * kPixelSideSamples; ++k) {
+          const std::size_t i =
+              index(kPixelSideSamples * x + k % kPixelSideSamples, kPixelSideSamples * y + k / kPixelSideSamples);
           if (!(depths_[i] > -std::numeric_limits<double>::infinity())) continue;
           sum += colors_[i];
           ++covered;
@@ -108,7 +109,7 @@ class Canvas {
         for (int channel = 0; channel < 3; ++channel)
           image.pixels.push_back(covered ? static_cast<std::uint8_t>(std::lround(255 * srgb(sum[channel] / covered)))
                                          : 0);
-        image.pixels.push_back(static_cast<std::uint8_t>(255 * covered / (kSamples * kSamples)));
+        image.pixels.push_back(static_cast<std::uint8_t>(255 * covered / (kPixelSideSamples * kPixelSideSamples)));
       }
     return image;
   }

@@ -31,13 +31,13 @@ class OneForOne {
 /// few digits may move a node by a millionth of the cell.
 void compare_nodes(const WrittenFile& file, bool is_rounded, std::span<const Vec3> found, std::span<const Vec3> wanted,
                    std::size_t c) {
-  constexpr double kMostShare = 1e-6;
+  constexpr double kMostReadBackErrorShare = 1e-6;
   Eigen::AlignedBox3d box;
   for (const Vec3& p : wanted) box.extend(p);
   const double extent = box.sizes().maxCoeff();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const double error = (found[i] - wanted[i]).cwiseAbs().maxCoeff();
-    if (error <= (is_rounded ? kMostShare * extent : 0)) continue;
+    if (error <= (is_rounded ? kMostReadBackErrorShare * extent : 0)) continue;
     const std::string cell = "the corners of cell " + std::to_string(c);
     if (!is_rounded) file.differs(cell);
     file.differs(

@@ -84,12 +84,12 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
 
 /// Compares the coordinates of a binary file; those of text are the numbers themselves.
 void compare_binary_stl(const WrittenFile& file, const std::string& bytes, const TriangleMesh& wanted) {
-  constexpr double kMostShare = 1e-6;  // of the extent
+  constexpr double kMostReadBackErrorShare = 1e-6;  // of the extent
   constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50, kVertexBytes = 12;
   Eigen::AlignedBox3d box;
   for (const auto& triangle : wanted.triangles)
     for (const Index v : triangle) box.extend(wanted.positions[static_cast<std::size_t>(v)]);
-  const double tolerance = kMostShare * box.sizes().maxCoeff();
+  const double tolerance = kMostReadBackErrorShare * box.sizes().maxCoeff();
   file.same_count("bytes", bytes.size(), kHeaderBytes + kFacetBytes * wanted.triangles.size());
   for (std::size_t t = 0; t < wanted.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k)
@@ -116,10 +116,10 @@ void compare_surface(const WrittenFile& file, const PolygonMesh& wanted) {
   Vec3 origin = Vec3::Zero();
   const PolygonMesh found = extension == ".obj" ? obj_polygons(file) : usda_polygons(file, origin);
   // Subtracting the translation and adding it again rounds twice.
-  constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+  constexpr double kTranslationRounding = 4 * std::numeric_limits<double>::epsilon();
   double reach = 0;
   for (const Vec3& p : wanted.positions) reach = std::max(reach, p.cwiseAbs().maxCoeff());
-  compare_polygons(file, found, wanted, origin.isZero(0) ? 0 : kRounding * reach);
+  compare_polygons(file, found, wanted, origin.isZero(0) ? 0 : kTranslationRounding * reach);
 }
 
 }  // namespace subvol::internal

@@ -14,7 +14,7 @@ namespace {
 constexpr double kBetweenSamples = 16.0 / 15;  // the largest value of a quadratic over a triangle, relative to that at
                                                // quarter points
 constexpr double kAlike = 0.7;                 // ratio of errors above which two ways to cut count as equally good
-constexpr int kShortest = kCellSteps;          // quads have samples between their corners
+constexpr int kShortestStripInterval = kCellSteps;  // quads have samples between their corners
 
 /// An interval of a strip that should be halved to improve a quad.
 struct Wish {
@@ -68,7 +68,7 @@ class PatchJudge {
   std::size_t num_intervals(int d) const { return samples_[d].size() / kCellSteps; }
 
   bool can_halve(int d, std::size_t interval) const {
-    return samples_[d][kCellSteps * (interval + 1)] - samples_[d][kCellSteps * interval] > kShortest;
+    return samples_[d][kCellSteps * (interval + 1)] - samples_[d][kCellSteps * interval] > kShortestStripInterval;
   }
 
   CellSamples samples(std::size_t i, std::size_t j) const {

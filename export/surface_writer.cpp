@@ -59,7 +59,7 @@ std::string binary_stl(const TriangleMesh& mesh) {
 /// the origin, and beyond the range of its numbers.
 bool needs_double_precision(const TriangleMesh& mesh) {
   constexpr double kMostTimes = 16;  // single precision has 24 bits: 2^-24 * 16 is about 1e-6
-  constexpr double kLargest = std::numeric_limits<float>::max();
+  constexpr double kLargestFloat32 = std::numeric_limits<float>::max();
   constexpr double kSmallest = std::numeric_limits<float>::min() * kMostTimes;  // of an extent
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const auto& t : mesh.triangles)
@@ -69,7 +69,7 @@ bool needs_double_precision(const TriangleMesh& mesh) {
     }
   if (mesh.triangles.empty()) return false;
   const double largest = low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff(), extent = (high - low).maxCoeff();
-  return largest > kMostTimes * extent || largest > kLargest || (extent > 0 && extent < kSmallest);
+  return largest > kMostTimes * extent || largest > kLargestFloat32 || (extent > 0 && extent < kSmallest);
 }
 
 /// A name on one line.

@@ -116,9 +116,9 @@ void append_array(std::string& text, const char* declaration, const Range& value
 /// The offset subtracted from the points, which USD keeps in single precision; a transform adds it again, in double.
 /// Zero unless the cage is much farther from the origin than it is large.
 Vec3 origin_of(const Vec3& low, const Vec3& high) {
-  constexpr double kFar = 8;
+  constexpr double kFarOriginRatio = 8;
   const double reach = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
-  return reach > kFar * (high - low).maxCoeff() ? Vec3(low + 0.5 * (high - low)) : Vec3::Zero();
+  return reach > kFarOriginRatio * (high - low).maxCoeff() ? Vec3(low + 0.5 * (high - low)) : Vec3::Zero();
 }
 
 /// Points of a prim, and the box around them.

@@ -11,8 +11,8 @@
 namespace subvol::internal {
 namespace {
 
-constexpr std::uint8_t kTriangle = kNumCellKinds,
-                       kQuad = kTriangle + 1;  // kinds of cells of surfaces, after those of CellKind
+/// Kinds of cells of surfaces, after those of CellKind.
+constexpr std::uint8_t kViewerTriangleKind = kNumCellKinds, kViewerQuadKind = kViewerTriangleKind + 1;
 
 /// Evaluates a cell's map at points in canonical coordinates.
 class CellMap {
@@ -81,9 +81,9 @@ void sample_face(const HighOrderMesh& mesh, std::size_t f, int n, Vec3* points) 
 int viewer_intervals(const HighOrderMesh& mesh, std::size_t most_points) {
   const int order = mesh.space.max_order();
   if (order == 1) return 1;
-  constexpr int kMost = 10;  // a picture shows no more of a cell
+  constexpr int kMostViewerIntervals = 10;  // a picture shows no more of a cell
   const MeshTopology& topology = mesh.space.topology();
-  int n = std::min(2 * order, kMost);
+  int n = std::min(2 * order, kMostViewerIntervals);
   const auto points = [&] {
     return topology.num_edges() * static_cast<std::size_t>(n - 1) + topology.num_faces() * inner_points(true, n);
   };
@@ -137,7 +137,8 @@ ViewerMesh viewer_mesh(std::string name, const PolygonMesh& mesh) {
       return viewer_mesh(std::move(name), as_polygons(triangulate(mesh)));
   ViewerMesh result{.name = std::move(name), .num_vertices = mesh.positions.size(), .points = mesh.positions};
   for (std::size_t f = 0; f < mesh.num_faces(); ++f)
-    result.kinds.push_back(mesh.face_offsets[f + 1] - mesh.face_offsets[f] == 4 ? kQuad : kTriangle);
+    result.kinds.push_back(mesh.face_offsets[f + 1] - mesh.face_offsets[f] == 4 ? kViewerQuadKind
+                                                                                : kViewerTriangleKind);
   result.corners = mesh.face_vertices;
   if (mesh.face_groups.empty()) return result;
   ViewerField groups{.name = "group", .label = "Group", .colors = ViewerField::Colors::regions};

@@ -80,7 +80,7 @@ class Writer {
 
  private:
   void add_points(const char* name, const std::vector<Vec3>& points) {
-    constexpr double kLeast = 1e-30;  // below it, single precision runs out of digits
+    constexpr double kLeastFloat32Size = 1e-30;  // below it, single precision runs out of digits
     std::vector<float> values;
     values.reserve(3 * points.size());
     double largest = 0;
@@ -92,7 +92,7 @@ class Writer {
       for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(placed[k]));
       largest = std::max(largest, placed.cwiseAbs().maxCoeff());
     }
-    if (largest > 0 && largest < kLeast)
+    if (largest > 0 && largest < kLeastFloat32Size)
       throw InputError("viewer_page: positions: expected a size in the range of float32");
     add(name, std::span<const float>(values), 3);
   }

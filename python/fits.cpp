@@ -306,9 +306,10 @@ void take_chord(Keywords& keywords, cli::WritingOptions& writing) {
 }
 
 void require_chord(double percent) {
-  constexpr double kLeast = 1e-4, kMost = 100;  // as in the program
-  if (!(percent >= kLeast && percent <= kMost))
-    throw InputError(internal::formatted("chord must be in [%g, %g] percent, got %g", kLeast, kMost, percent));
+  constexpr double kLeastChordPercent = 1e-4, kMostChordPercent = 100;  // as in the program
+  if (!(percent >= kLeastChordPercent && percent <= kMostChordPercent))
+    throw InputError(internal::formatted("chord must be in [%g, %g] percent, got %g", kLeastChordPercent,
+                                         kMostChordPercent, percent));
 }
 
 void add_fits(py::module_& module) {

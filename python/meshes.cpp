@@ -83,26 +83,27 @@ FeatureTags take_tags(Keywords& keywords, std::size_t num_points) {
 /// Adds the same four as properties: columns of the records themselves.
 template <class Mesh, class... Extra>
 void add_tags(py::class_<Mesh, Extra...>& type) {
-  constexpr py::ssize_t kCrease = sizeof(CreaseEdge), kCorner = sizeof(CornerVertex), kIndex = sizeof(Index);
+  constexpr py::ssize_t kCreaseRecordBytes = sizeof(CreaseEdge), kCornerRecordBytes = sizeof(CornerVertex),
+                        kIndexBytes = sizeof(Index);
   type.def_property_readonly("creases", [](const py::object& self) {
     const auto& creases = self.cast<const Mesh&>().tags.creases;
     return shown(creases.empty() ? nullptr : &creases[0].v0, {static_cast<py::ssize_t>(creases.size()), 2}, self, false,
-                 {kCrease, kIndex});
+                 {kCreaseRecordBytes, kIndexBytes});
   }, "Boundary edges kept sharp: (n, 2) int32, the smaller point first. A view.");
   type.def_property_readonly("crease_sharpness", [](const py::object& self) {
     const auto& creases = self.cast<const Mesh&>().tags.creases;
     return shown(creases.empty() ? nullptr : &creases[0].sharpness, {static_cast<py::ssize_t>(creases.size())}, self,
-                 false, {kCrease});
+                 false, {kCreaseRecordBytes});
   }, "Refinements each crease stays sharp for: (n,) float64; from 10 on for ever. A view.");
   type.def_property_readonly("corners", [](const py::object& self) {
     const auto& corners = self.cast<const Mesh&>().tags.corners;
     return shown(corners.empty() ? nullptr : &corners[0].vertex, {static_cast<py::ssize_t>(corners.size())}, self,
-                 false, {kCorner});
+                 false, {kCornerRecordBytes});
   }, "Boundary points kept in their place: (n,) int32. A view.");
   type.def_property_readonly("corner_sharpness", [](const py::object& self) {
     const auto& corners = self.cast<const Mesh&>().tags.corners;
     return shown(corners.empty() ? nullptr : &corners[0].sharpness, {static_cast<py::ssize_t>(corners.size())}, self,
-                 false, {kCorner});
+                 false, {kCornerRecordBytes});
   }, "As crease_sharpness, of the corners: (n,) float64. A view.");
 }
 
@@ -112,14 +113,14 @@ struct KindName {
   CellKind kind;
   const char* plural;
 };
-constexpr std::array<KindName, kNumCellKinds> kKinds{
+constexpr std::array<KindName, kNumCellKinds> kCellKindNames{
     {{CellKind::hex, "hexes"}, {CellKind::prism, "prisms"}, {CellKind::tet, "tets"}, {CellKind::pyramid, "pyramids"}}};
 
 std::shared_ptr<VolumeMesh> make_volume(const py::object& points, const py::kwargs& given) {
   Keywords keywords("VolumeMesh", given);
   auto mesh = std::make_shared<VolumeMesh>();
   mesh->positions = points_from(points, "points");
-  for (const auto& [kind, plural] : kKinds) {
+  for (const auto& [kind, plural] : kCellKindNames) {
     const auto corners = static_cast<std::size_t>(cell_topology(kind).num_vertices);
     const std::vector<Index> cells = indices_from(keywords.object(plural), plural, corners, mesh->num_vertices());
     for (std::size_t i = 0; i < cells.size(); i += corners) mesh->add_cell(kind, {cells.data() + i, corners});
@@ -151,7 +152,7 @@ py::array cells_of(const py::object& self, CellKind kind) {
 
 std::string volume_text(const VolumeMesh& mesh) {
   std::string text = "<subvol.VolumeMesh: " + std::to_string(mesh.num_vertices()) + " points";
-  for (const auto& [kind, plural] : kKinds)
+  for (const auto& [kind, plural] : kCellKindNames)
     if (const auto count = std::count(mesh.kinds.begin(), mesh.kinds.end(), kind); count > 0)
       text += ", " + std::to_string(count) + ' ' + plural;
   return text + '>';
@@ -187,7 +188,7 @@ Takes the arrays named above.)");
   type.def_property_readonly("points", [](const py::object& self) {
     return shown_points(self.cast<const VolumeMesh&>().positions, self);
   }, "(n, 3) float64. A view that can be written.");
-  for (const auto& [kind, plural] : kKinds)
+  for (const auto& [kind, plural] : kCellKindNames)
     type.def_property_readonly(plural, [k = kind](const py::object& self) { return cells_of(self, k); },
                                "Point numbers of the cells of this kind: int32, one row for each. A view where these "
                                "cells follow one another.");
@@ -449,7 +450,7 @@ SurfaceMesh shell_surface_from(const py::object& object, const char* name, std::
 }
 
 void add_meshes(py::module_& module) {
-  for (const auto& [kind, plural] : kKinds) {
+  for (const auto& [kind, plural] : kCellKindNames) {
     std::string name = cell_topology(kind).name;
     std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::toupper(c); });
     module.attr(name.c_str()) = static_cast<int>(kind);

@@ -27,9 +27,10 @@ namespace {
 using namespace subvol;
 using namespace subvol::internal;
 
-constexpr int kSide = 4, kLayers = 1, kOrder = 3;
+constexpr int kStarBlockSide = 4, kStarLayers = 1, kStarOrder = 3;
 
-/// Blocks of kSide x kSide x kLayers hexes around the z axis, skewed to share the full turn between them.
+/// Blocks of kStarBlockSide x kStarBlockSide x kStarLayers hexes around the z axis, skewed to share the full turn
+/// between them.
 VolumeMesh star(int blocks) {
   VolumeMesh mesh;
   std::map<std::array<int, 4>, Index> numbers;
@@ -47,9 +48,9 @@ VolumeMesh star(int blocks) {
     return entry->second;
   };
   for (int block = 0; block < blocks; ++block)
-    for (int j = 0; j < kSide; ++j)
-      for (int i = 0; i < kSide; ++i)
-        for (int k = 0; k < kLayers; ++k)
+    for (int j = 0; j < kStarBlockSide; ++j)
+      for (int i = 0; i < kStarBlockSide; ++i)
+        for (int k = 0; k < kStarLayers; ++k)
           mesh.add_cell(CellKind::hex,
                         std::array<Index, 8>{vertex(block, i, j, k), vertex(block, i + 1, j, k),
                                              vertex(block, i + 1, j + 1, k), vertex(block, i, j + 1, k),
@@ -61,20 +62,20 @@ VolumeMesh star(int blocks) {
 
 /// Volume of a cell by the rule of its energy's kind: the mean of the determinants on a fine grid.
 double volume(const HighOrderMesh& mesh, std::size_t cell) {
-  constexpr int kPoints = 8;
+  constexpr int kVolumeGridPoints = 8;
   double sum = 0;
-  for (int k = 0; k < kPoints; ++k)
-    for (int j = 0; j < kPoints; ++j)
-      for (int i = 0; i < kPoints; ++i)
-        sum += mesh.jacobian(cell, (Vec3(i, j, k) + Vec3::Constant(0.5)) / kPoints).determinant();
-  return sum / (kPoints * kPoints * kPoints);
+  for (int k = 0; k < kVolumeGridPoints; ++k)
+    for (int j = 0; j < kVolumeGridPoints; ++j)
+      for (int i = 0; i < kVolumeGridPoints; ++i)
+        sum += mesh.jacobian(cell, (Vec3(i, j, k) + Vec3::Constant(0.5)) / kVolumeGridPoints).determinant();
+  return sum / (kVolumeGridPoints * kVolumeGridPoints * kVolumeGridPoints);
 }
 
 HighOrderMesh relaxed(const VolumeMesh& start, Distortion distortion) {
-  const ElementSpace space(start, Basis::fourier, kOrder);
+  const ElementSpace space(start, Basis::fourier, kStarOrder);
   HighOrderMesh mesh(space, start);
   auto energy = std::make_unique<HighOrderEnergy>(mesh.space, std::vector(start.num_cells(), Vec3(1, 1, 1)),
-                                                  std::vector<int>(start.num_cells(), 2 * kOrder + 1));
+                                                  std::vector<int>(start.num_cells(), 2 * kStarOrder + 1));
   energy->set_distortion(distortion);
   const SparseMap nodes = identity_map(mesh.coefficients.size());
   FitProblem problem(nodes, select_rows(nodes, {}), std::move(energy), nullptr, 1);
@@ -94,10 +95,11 @@ int main(int argc, char** argv) try {
       const HighOrderMesh mesh = relaxed(start, distortion);
       double inner = 0, outer = 0;  // cells are numbered by block, row, column, layer
       for (int block = 0; block < blocks; ++block)
-        for (int k = 0; k < kLayers; ++k) {
-          const std::size_t first = static_cast<std::size_t>(block) * kSide * kSide * kLayers;
+        for (int k = 0; k < kStarLayers; ++k) {
+          const std::size_t first = static_cast<std::size_t>(block) * kStarBlockSide * kStarBlockSide * kStarLayers;
           inner += volume(mesh, first + static_cast<std::size_t>(k));
-          outer += volume(mesh, first + static_cast<std::size_t>((kSide * kSide - 1) * kLayers + k));
+          outer +=
+              volume(mesh, first + static_cast<std::size_t>((kStarBlockSide * kStarBlockSide - 1) * kStarLayers + k));
         }
       const QualityReport quality = measure_quality(mesh);
       valid = valid && quality.inverted_cells == 0;

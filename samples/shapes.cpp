@@ -29,14 +29,15 @@ using Lattice = std::array<int, 3>;
 // Hexes over unit cubes of a lattice, vertices shared, positions moved by a map.
 template <typename Map>
 VolumeMesh lattice_mesh(const std::vector<Lattice>& cubes, const Map& position) {
-  static constexpr std::array<Lattice, 8> kCorners{
+  static constexpr std::array<Lattice, 8> kUnitCubeCorners{
       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
   VolumeMesh mesh;
   std::map<Lattice, Index> numbers;
   for (const Lattice& cube : cubes) {
     std::array<Index, 8> cell{};
     for (std::size_t c = 0; c < 8; ++c) {
-      const Lattice node{cube[0] + kCorners[c][0], cube[1] + kCorners[c][1], cube[2] + kCorners[c][2]};
+      const Lattice node{cube[0] + kUnitCubeCorners[c][0], cube[1] + kUnitCubeCorners[c][1],
+                         cube[2] + kUnitCubeCorners[c][2]};
       const auto [entry, added] = numbers.try_emplace(node, static_cast<Index>(mesh.positions.size()));
       if (added) mesh.positions.push_back(position(Vec3(node[0], node[1], node[2])));
       cell[c] = entry->second;
@@ -174,11 +175,11 @@ Sample torus_sample() { return {"torus", bumpy_torus(120, 48), torus_ring(12)}; 
 Sample ball_sample() { return {"ball", bumpy_ball(24), seven_cells()}; }
 
 Sample bracket_sample() {
-  static constexpr int kFiner = 8;
+  static constexpr int kBracketFineness = 8;
   VolumeMesh cells = lattice_mesh(bracket_cubes(1), [](const Vec3& p) { return Vec3(p - Vec3(0, 1, 0)); });
   cells.tags = features_by_angle(cells, kCreaseAngleDegrees);
   const VolumeMesh fine =
-      lattice_mesh(bracket_cubes(kFiner), [](const Vec3& p) { return bend_bracket(p / kFiner); });
+      lattice_mesh(bracket_cubes(kBracketFineness), [](const Vec3& p) { return bend_bracket(p / kBracketFineness); });
   return {"bracket", boundary_triangles(fine), cells};
 }
 

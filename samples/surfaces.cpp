@@ -61,7 +61,7 @@ constexpr double kMiddle = 0.8, kRodThickness = 0.3;
 
 /// Returns the outline of an end, counterclockwise from the line x = kMiddle.
 std::vector<Vec3> outline_of(const RodEnd& end, bool is_left) {
-  constexpr int kAcross = 6, kAlong = 8, kArc = 24;
+  constexpr int kRodSegmentsAcross = 6, kRodSegmentsAlong = 8, kRodArcSegments = 24;
   // Both circles touch the straight sides, whose normal makes this angle with the x-axis.
   const double angle = std::acos((kSmallEnd.outer - kLargeEnd.outer) / (kLargeEnd.center - kSmallEnd.center));
   const double half = (kSmallEnd.outer - kMiddle * std::cos(angle)) / std::sin(angle);  // the rod's width there
@@ -74,20 +74,20 @@ std::vector<Vec3> outline_of(const RodEnd& end, bool is_left) {
   };
   const double first = is_left ? angle : -angle, last = is_left ? kTau - angle : angle;
   const Vec3 low(kMiddle, -half, 0), high(kMiddle, half, 0);
-  for (int k = 0; k < kAcross; ++k) {  // the same points from either side
-    const int at = is_left ? k : kAcross - k;
-    outline.emplace_back(kMiddle, half * (2.0 * at / kAcross - 1), 0);
+  for (int k = 0; k < kRodSegmentsAcross; ++k) {  // the same points from either side
+    const int at = is_left ? k : kRodSegmentsAcross - k;
+    outline.emplace_back(kMiddle, half * (2.0 * at / kRodSegmentsAcross - 1), 0);
   }
-  add_line(is_left ? high : low, on_circle(first), kAlong);
-  for (int k = 0; k < kArc; ++k) outline.push_back(on_circle(first + (last - first) * k / kArc));
-  add_line(on_circle(last), is_left ? low : high, kAlong);
+  add_line(is_left ? high : low, on_circle(first), kRodSegmentsAlong);
+  for (int k = 0; k < kRodArcSegments; ++k) outline.push_back(on_circle(first + (last - first) * k / kRodArcSegments));
+  add_line(on_circle(last), is_left ? low : high, kRodSegmentsAlong);
   return outline;
 }
 
 }  // namespace
 
 PolygonMesh rod_surface() {
-  constexpr int kRings = 5, kLayers = 4;
+  constexpr int kRodRings = 5, kRodLayers = 4;
   QuadBuilder rod({{"small_bore", 1}, {"large_bore", 2}, {"side", 3}, {"bottom", 4}, {"top", 5}});
   for (const RodEnd& end : {kSmallEnd, kLargeEnd}) {
     const bool is_left = end.center < kMiddle;
@@ -95,27 +95,27 @@ PolygonMesh rod_surface() {
     const Vec3 center(end.center, 0, 0);
     const auto vertex = [&](std::size_t side, int ring, int layer) {
       const Vec3& out = outline[side % outline.size()];
-      const double share = static_cast<double>(ring) / kRings;
+      const double share = static_cast<double>(ring) / kRodRings;
       const Vec3 at =
-          ring == kRings ? out : Vec3((1 - share) * (center + end.bore * (out - center).normalized()) + share * out);
-      return rod.vertex(at + Vec3(0, 0, kRodThickness * layer / kLayers));
+          ring == kRodRings ? out : Vec3((1 - share) * (center + end.bore * (out - center).normalized()) + share * out);
+      return rod.vertex(at + Vec3(0, 0, kRodThickness * layer / kRodLayers));
     };
     for (std::size_t side = 0; side < outline.size(); ++side) {
-      for (int ring = 0; ring < kRings; ++ring) {
+      for (int ring = 0; ring < kRodRings; ++ring) {
         const auto quad = [&](int layer) {
           return std::array<Index, 4>{vertex(side, ring, layer), vertex(side, ring + 1, layer),
                                       vertex(side + 1, ring + 1, layer), vertex(side + 1, ring, layer)};
         };
-        rod.add_both("bottom", quad(0), "top", quad(kLayers));
+        rod.add_both("bottom", quad(0), "top", quad(kRodLayers));
       }
       const auto wall = [&](std::size_t a, std::size_t b, int ring, int layer) {
         return std::array<Index, 4>{vertex(a, ring, layer), vertex(b, ring, layer), vertex(b, ring, layer + 1),
                                     vertex(a, ring, layer + 1)};
       };
       const bool is_inside = outline[side].x() == kMiddle && outline[(side + 1) % outline.size()].x() == kMiddle;
-      for (int layer = 0; layer < kLayers; ++layer) {
+      for (int layer = 0; layer < kRodLayers; ++layer) {
         rod.add(end.bore_name, wall(side + 1, side, 0, layer));
-        if (!is_inside) rod.add("side", wall(side, side + 1, kRings, layer));
+        if (!is_inside) rod.add("side", wall(side, side + 1, kRodRings, layer));
       }
     }
   }
@@ -192,8 +192,9 @@ PolygonMesh bowl_surface(int n) {
 }
 
 PolygonMesh plate_surface() {
-  constexpr double kLength = 2, kWidth = 1, kThickness = 0.02, kRadius = 0.25;
-  constexpr int kAcross = 16, kAlong = 32, kRings = 8, kSides = kAcross + kAlong;
+  constexpr double kPlateLength = 2, kPlateWidth = 1, kPlateThickness = 0.02, kPlateHoleRadius = 0.25;
+  constexpr int kPlateSegmentsAcross = 16, kPlateSegmentsAlong = 32, kPlateRings = 8,
+                kPlateSegments = kPlateSegmentsAcross + kPlateSegmentsAlong;
   const std::vector<Group> groups{{"symmetry_x", 1}, {"symmetry_y", 2}, {"symmetry_z", 3}, {"hole", 4},
                                   {"loaded", 5},     {"side", 6},       {"top", 7}};
   const auto group = [&](const char* name) {
@@ -203,23 +204,26 @@ PolygonMesh plate_surface() {
   PolygonMesh plate;
   plate.face_groups.groups = groups;
   // Points on rays from the hole to the outline, at the bottom and at the top.
-  for (const double z : {0.0, kThickness})
-    for (int ring = 0; ring <= kRings; ++ring)
-      for (int side = 0; side <= kSides; ++side) {
-        const Vec3 outline = side <= kAcross ? Vec3(kLength, kWidth * side / kAcross, 0)
-                                             : Vec3(kLength * (kSides - side) / kAlong, kWidth, 0);
-        const Vec3 rim = kRadius * outline.normalized();
-        const double share = static_cast<double>(ring) / kRings;
+  for (const double z : {0.0, kPlateThickness})
+    for (int ring = 0; ring <= kPlateRings; ++ring)
+      for (int side = 0; side <= kPlateSegments; ++side) {
+        const Vec3 outline = side <= kPlateSegmentsAcross
+                                 ? Vec3(kPlateLength, kPlateWidth * side / kPlateSegmentsAcross, 0)
+                                 : Vec3(kPlateLength * (kPlateSegments - side) / kPlateSegmentsAlong, kPlateWidth, 0);
+        const Vec3 rim = kPlateHoleRadius * outline.normalized();
+        const double share = static_cast<double>(ring) / kPlateRings;
         plate.positions.push_back((1 - share) * rim + share * outline + z * Vec3::UnitZ());
       }
-  const auto vertex = [](int layer, int ring, int side) { return (layer * (kRings + 1) + ring) * (kSides + 1) + side; };
+  const auto vertex = [](int layer, int ring, int side) {
+    return (layer * (kPlateRings + 1) + ring) * (kPlateSegments + 1) + side;
+  };
   const auto add = [&](const char* name, std::array<Index, 4> corners) {
     plate.face_vertices.insert(plate.face_vertices.end(), corners.begin(), corners.end());
     plate.face_offsets.push_back(plate.face_vertices.size());
     plate.face_groups.of_face.push_back(group(name));
   };
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (int side = 0; side < kSides; ++side)
+  for (int ring = 0; ring < kPlateRings; ++ring) {
+    for (int side = 0; side < kPlateSegments; ++side)
       for (const int layer : {0, 1}) {
         std::array<Index, 4> corners{vertex(layer, ring, side), vertex(layer, ring + 1, side),
                                      vertex(layer, ring + 1, side + 1), vertex(layer, ring, side + 1)};
@@ -227,12 +231,13 @@ PolygonMesh plate_surface() {
         add(layer == 0 ? "symmetry_z" : "top", corners);
       }
     add("symmetry_y", {vertex(0, ring, 0), vertex(0, ring + 1, 0), vertex(1, ring + 1, 0), vertex(1, ring, 0)});
-    add("symmetry_x", {vertex(0, ring + 1, kSides), vertex(0, ring, kSides), vertex(1, ring, kSides),
-                       vertex(1, ring + 1, kSides)});
+    add("symmetry_x", {vertex(0, ring + 1, kPlateSegments), vertex(0, ring, kPlateSegments),
+                       vertex(1, ring, kPlateSegments), vertex(1, ring + 1, kPlateSegments)});
   }
-  for (int side = 0; side < kSides; ++side) {
-    add(side < kAcross ? "loaded" : "side", {vertex(0, kRings, side), vertex(0, kRings, side + 1),
-                                             vertex(1, kRings, side + 1), vertex(1, kRings, side)});
+  for (int side = 0; side < kPlateSegments; ++side) {
+    add(side < kPlateSegmentsAcross ? "loaded" : "side",
+        {vertex(0, kPlateRings, side), vertex(0, kPlateRings, side + 1), vertex(1, kPlateRings, side + 1),
+         vertex(1, kPlateRings, side)});
     add("hole", {vertex(0, 0, side + 1), vertex(0, 0, side), vertex(1, 0, side), vertex(1, 0, side + 1)});
   }
   return plate;

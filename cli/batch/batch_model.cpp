@@ -34,14 +34,18 @@ Shard parse_shard(const std::string& text) {
 }
 
 std::string folder_name(std::string_view id) {
-  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  constexpr std::string_view kPlainFolderCharacters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
+  constexpr std::string_view kHexadecimalDigits = "0123456789ABCDEF";
   std::string name;
   for (const char c : id) {
     const auto byte = static_cast<unsigned char>(c);
-    if (c == '/') name += '+';
-    else if (kPlain.find(c) != std::string_view::npos || (c == '.' && !name.empty())) name += c;
-    else (name += '=', name += kDigits[byte >> 4], name += kDigits[byte & 15]);
+    if (c == '/')
+      name += '+';
+    else if (kPlainFolderCharacters.find(c) != std::string_view::npos || (c == '.' && !name.empty()))
+      name += c;
+    else
+      (name += '=', name += kHexadecimalDigits[byte >> 4], name += kHexadecimalDigits[byte & 15]);
   }
   if (name.size() <= kLongestFolderName) return name;
   return name.substr(0, kLongestFolderName - 20) + "==" + Fingerprint().add(id).text();

@@ -14,7 +14,7 @@ namespace subvol::cli {
 using namespace internal;
 namespace {
 
-constexpr std::size_t kMostRows = 200, kMostReasons = 20;
+constexpr std::size_t kMostBatchPageRows = 200, kMostReasons = 20;
 
 using Link = std::function<std::string(const ModelFigures&)>;
 
@@ -92,11 +92,13 @@ std::string quantiles(const BatchSummary& summary) {
 
 /// Counts of the least scaled Jacobians in 20 bins over [-1, 1].
 std::string histogram(const BatchSummary& summary) {
-  constexpr int kBins = 20;
-  std::vector<std::size_t> counts(kBins);
+  constexpr int kScaledJacobianBins = 20;
+  std::vector<std::size_t> counts(kScaledJacobianBins);
   for (const ModelFigures& model : summary.models) {
     const double quality = model.figures[kMinQuality];
-    if (!std::isnan(quality)) ++counts[static_cast<std::size_t>(std::clamp(int((quality + 1) / 2 * kBins), 0, kBins - 1))];
+    if (!std::isnan(quality))
+      ++counts[static_cast<std::size_t>(
+          std::clamp(int((quality + 1) / 2 * kScaledJacobianBins), 0, kScaledJacobianBins - 1))];
   }
   const std::string plot = histogram_plot(counts);
   if (plot.empty()) return {};
@@ -117,7 +119,7 @@ std::string gallery(const BatchSummary& summary, const std::vector<ShownModel>& 
 
 std::string models(const BatchSummary& summary, const Link& link) {
   std::string rows;
-  for (std::size_t i = 0; i < std::min(summary.models.size(), kMostRows); ++i) {
+  for (std::size_t i = 0; i < std::min(summary.models.size(), kMostBatchPageRows); ++i) {
     const ModelFigures& model = summary.models[i];
     const auto& f = model.figures;
     rows += row({linked_id(model, link), std::string(name_of(model.outcome)), text_of(f[kCells]),
@@ -128,7 +130,7 @@ std::string models(const BatchSummary& summary, const Link& link) {
   return table({"model", "class", "cells", "least SJ", "mean SJ", "mean distance, %", "max distance, %", "seconds",
                 "memory, MB"},
                rows) +
-         left_out(summary.models.size(), kMostRows);
+         left_out(summary.models.size(), kMostBatchPageRows);
 }
 
 std::string comparison_text(const PageComparison& page, const BatchSummary& now, const Link& link) {
@@ -140,11 +142,11 @@ std::string comparison_text(const PageComparison& page, const BatchSummary& now,
                     found.mended.size());
   const auto list = [&](const char* title, const std::vector<Compared>& pairs, const auto& value) {
     std::string rows;
-    for (std::size_t i = 0; i < std::min(pairs.size(), kMostRows); ++i) {
+    for (std::size_t i = 0; i < std::min(pairs.size(), kMostBatchPageRows); ++i) {
       const ModelFigures &old = page.before.models[pairs[i].before], &fresh = now.models[pairs[i].now];
       rows += row({linked_id(fresh, link), value(old), value(fresh), escaped(fresh.reason)});
     }
-    if (!rows.empty()) text += table({title, "before", "now", ""}, rows) + left_out(pairs.size(), kMostRows);
+    if (!rows.empty()) text += table({title, "before", "now", ""}, rows) + left_out(pairs.size(), kMostBatchPageRows);
   };
   const auto outcome = [](const ModelFigures& model) { return std::string(name_of(model.outcome)); };
   const auto figure = [](Figure k) { return [k](const ModelFigures& model) { return text_of(model.figures[k]); }; };

@@ -10,7 +10,7 @@
 namespace subvol::cli {
 namespace {
 
-constexpr std::array<FigureKind, kNumFigures> kKinds{{
+constexpr std::array<FigureKind, kNumFigures> kFigureKinds{{
     {"min_scaled_jacobian", "least scaled Jacobian", &RecordFields::min_scaled_jacobian, 1, true},
     {"mean_scaled_jacobian", "mean scaled Jacobian", &RecordFields::mean_scaled_jacobian, 1, true},
     {"mean_distance_percent", "mean distance, % of diagonal", &RecordFields::mean_distance_percent, 1, true},
@@ -22,7 +22,7 @@ constexpr std::array<FigureKind, kNumFigures> kKinds{{
 }};
 }  // namespace
 
-std::span<const FigureKind> figure_kinds() { return kKinds; }
+std::span<const FigureKind> figure_kinds() { return kFigureKinds; }
 
 Quantiles quantiles_of(std::vector<double> values) {
   std::erase_if(values, [](double value) { return std::isnan(value); });
@@ -54,7 +54,7 @@ BatchSummary summarize(std::span<const std::filesystem::path> folders) {
     model.reason = fields->reason;
     model.outcome = *outcome_named(fields->outcome);
     model.folder = static_cast<std::uint32_t>(entry.folder);
-    for (std::size_t k = 0; k < kNumFigures; ++k) model.figures[k] = fields->*kKinds[k].value;
+    for (std::size_t k = 0; k < kNumFigures; ++k) model.figures[k] = fields->*kFigureKinds[k].value;
     ++summary.counts[static_cast<std::size_t>(model.outcome)];
   });
   // The order of the ids themselves: in records, some characters of them are written in another way.
@@ -63,7 +63,7 @@ BatchSummary summarize(std::span<const std::filesystem::path> folders) {
   for (std::size_t k = 0; k < kNumFigures; ++k) {
     std::vector<double> values;
     for (const ModelFigures& model : summary.models)
-      if (!kKinds[k].of_results || !is_failure(model.outcome)) values.push_back(model.figures[k]);
+      if (!kFigureKinds[k].of_results || !is_failure(model.outcome)) values.push_back(model.figures[k]);
     summary.quantiles[k] = quantiles_of(std::move(values));
   }
   return summary;
@@ -124,7 +124,7 @@ Json summary_json(const BatchSummary& summary) {
   for (std::size_t k = 0; k < kNumFigures; ++k) {
     const Quantiles& found = summary.quantiles[k];
     if (found.count == 0) continue;
-    Json& figure = json["quantiles"][kKinds[k].name] = Json{{"count", found.count}, {"mean", found.mean}};
+    Json& figure = json["quantiles"][kFigureKinds[k].name] = Json{{"count", found.count}, {"mean", found.mean}};
     for (std::size_t i = 0; i < found.values.size(); ++i)
       figure["p" + std::to_string(Quantiles::kPercent[i])] = found.values[i];
   }

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 /// Options that the batch gives itself, or that make no sense in a batch.
 constexpr std::array<std::string_view, 6> kReserved{"--output", "--report", "--force", "--quiet", "--config", "--help"};
 
-constexpr const char* kColumns = "'id', 'verb', 'input', 'options', 'outputs', or the name of an option";
+constexpr const char* kManifestColumnNames = "'id', 'verb', 'input', 'options', 'outputs', or the name of an option";
 
 /// Where a model stands, for messages; made into text only if there is something to say.
 struct Place {
@@ -138,7 +138,7 @@ class Collector {
       if (name == "-o" || is_reserved)
         throw InputError(std::string(name) + ": the batch gives this option itself; 'outputs' names what is written");
       if (name.starts_with("--") && !verb.has(name))
-        throw InputError(model.verb + " has no option " + in_quotes(name) + "; a column is " + kColumns +
+        throw InputError(model.verb + " has no option " + in_quotes(name) + "; a column is " + kManifestColumnNames +
                          ", and is ignored if its name begins with #");
     }
   }
@@ -167,7 +167,8 @@ void read_table(const std::string& path, char separator, Collector& all) {
   const std::uint32_t folder = all.add_folder(fs::path(path).parent_path());
   TableRows rows(path, text, separator);
   std::vector<std::string> names, fields;
-  if (!rows.next(names)) throw InputError(path + ": expected a first line with the names of columns: " + kColumns);
+  if (!rows.next(names))
+    throw InputError(path + ": expected a first line with the names of columns: " + kManifestColumnNames);
   if (std::find(names.begin(), names.end(), "input") == names.end())
     throw InputError(rows.place() + ": expected a column 'input' among the names of the first line");
   while (rows.next(fields)) {

@@ -15,7 +15,7 @@ struct Words {
 };
 
 /// In the order of `Outcome`.
-constexpr std::array<Words, kNumOutcomes> kWords{{
+constexpr std::array<Words, kNumOutcomes> kOutcomeWords{{
     {"valid", "a valid result"},
     {"not_converged", "a valid result that misses a tolerance or met a limit"},
     {"not_valid", "the mesh is not valid, or the surface bounds no solid"},
@@ -105,12 +105,12 @@ Verdict judge_exit(int status, const Remains& remains) {
 
 }  // namespace
 
-std::string_view name_of(Outcome outcome) { return kWords[static_cast<std::size_t>(outcome)].name; }
-std::string_view meaning_of(Outcome outcome) { return kWords[static_cast<std::size_t>(outcome)].meaning; }
+std::string_view name_of(Outcome outcome) { return kOutcomeWords[static_cast<std::size_t>(outcome)].name; }
+std::string_view meaning_of(Outcome outcome) { return kOutcomeWords[static_cast<std::size_t>(outcome)].meaning; }
 
 std::optional<Outcome> outcome_named(std::string_view name) {
-  for (std::size_t i = 0; i < kWords.size(); ++i)
-    if (kWords[i].name == name) return static_cast<Outcome>(i);
+  for (std::size_t i = 0; i < kOutcomeWords.size(); ++i)
+    if (kOutcomeWords[i].name == name) return static_cast<Outcome>(i);
   return {};
 }
 

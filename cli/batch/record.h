@@ -28,14 +28,14 @@ std::string record_line(const BatchModel& model, const WorkKey& key, const Verdi
 
 /// The entries of a record that plans and summaries need. Numbers that a record lacks are NaN.
 struct RecordFields {
-  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kMissingNumber = std::numeric_limits<double>::quiet_NaN();
   std::string id, outcome, reason, verb, input;
   WorkKey key;
   std::string input_stamp;
-  double cells = kNone, min_scaled_jacobian = kNone, mean_scaled_jacobian = kNone;
-  double mean_distance_percent = kNone, max_distance_percent = kNone;
-  double sharp_edges = kNone, followed_edges = kNone;
-  double wall_seconds = kNone, cpu_seconds = kNone, peak_memory_bytes = kNone;
+  double cells = kMissingNumber, min_scaled_jacobian = kMissingNumber, mean_scaled_jacobian = kMissingNumber;
+  double mean_distance_percent = kMissingNumber, max_distance_percent = kMissingNumber;
+  double sharp_edges = kMissingNumber, followed_edges = kMissingNumber;
+  double wall_seconds = kMissingNumber, cpu_seconds = kMissingNumber, peak_memory_bytes = kMissingNumber;
 };
 
 /// Reads records, one after the other, into the same fields.

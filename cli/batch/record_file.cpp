@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 /// The byte of the claims that is locked while a record is appended. Models lock bytes below it.
 constexpr std::int64_t kAppendByte = std::int64_t{1} << 62;
-constexpr std::size_t kBlock = std::size_t{1} << 22;
+constexpr std::size_t kRecordBlockBytes = std::size_t{1} << 22;
 constexpr std::chrono::seconds kFlushInterval{1};
 
 std::int64_t byte_of(std::string_view id) { return static_cast<std::int64_t>(id_hash(id) >> 2); }
@@ -36,7 +36,7 @@ std::uint64_t size_of(int file, const fs::path& path) {
 
 std::uint64_t for_each_line(int file, const fs::path& path, std::uint64_t from,
                             const std::function<void(std::string_view)>& use) {
-  std::vector<char> block(kBlock);
+  std::vector<char> block(kRecordBlockBytes);
   std::size_t filled = 0;
   for (std::uint64_t at = from;;) {
     if (filled == block.size()) block.resize(2 * block.size());  // a line longer than the block

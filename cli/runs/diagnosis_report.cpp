@@ -90,11 +90,11 @@ std::string place_line(const SurfacePlace& place) {
 /// Says how the references of cells have become numbers of regions.
 std::string renumbering(const std::filesystem::path& path, std::span<const int> references,
                         std::span<const Group> regions) {
-  constexpr std::size_t kMost = 10;
+  constexpr std::size_t kMostListedReferences = 10;
   std::string text = path.string() + ": a reference is below 1, so the regions are numbered anew:";
-  for (std::size_t i = 0; i < std::min(kMost, references.size()); ++i)
+  for (std::size_t i = 0; i < std::min(kMostListedReferences, references.size()); ++i)
     text += formatted("%s %d becomes %d", i == 0 ? "" : ",", references[i], regions[i].number);
-  return references.size() > kMost ? text + " and so on" : text;
+  return references.size() > kMostListedReferences ? text + " and so on" : text;
 }
 
 SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, std::vector<std::string>& warnings) {

@@ -24,8 +24,8 @@ static_assert(std::atomic<long long>::is_always_lock_free && std::atomic<bool>::
 // Calls only functions that are allowed in a signal handler.
 void note(int) {
   if (ends_at_once) {
-    constexpr char kWords[] = "subvol: interrupted\n";
-    (void)!write(STDERR_FILENO, kWords, sizeof kWords - 1);
+    constexpr char kInterruptedMessage[] = "subvol: interrupted\n";
+    (void)!write(STDERR_FILENO, kInterruptedMessage, sizeof kInterruptedMessage - 1);
     delete_temporaries();
     _exit(kInterrupted);
   }

@@ -292,14 +292,14 @@ void require_choice_of_references(const std::filesystem::path& path, const std::
 }
 
 std::vector<double> load_thicknesses(const std::filesystem::path& path) {
-  constexpr std::string_view kBlanks = " \t";
+  constexpr std::string_view kThicknessFileBlanks = " \t";
   const std::string bytes = read_file(path);
   TextScanner lines(path.string(), bytes, TextScanner::Comments::none);
   std::vector<double> thicknesses;
   while (const auto line = lines.line()) {
-    const std::size_t begin = line->find_first_not_of(kBlanks);
+    const std::size_t begin = line->find_first_not_of(kThicknessFileBlanks);
     if (begin == line->npos) continue;
-    const std::string_view word = line->substr(begin, line->find_last_not_of(kBlanks) + 1 - begin);
+    const std::string_view word = line->substr(begin, line->find_last_not_of(kThicknessFileBlanks) + 1 - begin);
     const auto value = parse_number(word);
     if (!value || !(*value > 0)) lines.fail("expected a positive thickness, found " + in_quotes(word));
     thicknesses.push_back(*value);

@@ -35,11 +35,11 @@ bool has_face_of_several_groups(const VolumeFaceGroups& groups) {
 
 /// Returns a name in quotes: on one line, and cut if it is long.
 std::string quoted_label(std::string label) {
-  constexpr std::size_t kLongest = 60;
+  constexpr std::size_t kLongestQuotedLabel = 60;
   std::replace_if(
       label.begin(), label.end(), [](unsigned char c) { return c < ' ' || c == 127; }, ' ');
-  if (label.size() <= kLongest) return '"' + label + '"';
-  std::size_t end = kLongest;
+  if (label.size() <= kLongestQuotedLabel) return '"' + label + '"';
+  std::size_t end = kLongestQuotedLabel;
   while (end > 0 && (static_cast<unsigned char>(label[end]) & 0xC0) == 0x80) --end;  // not within a character
   return '"' + label.substr(0, end) + "...\"";
 }
@@ -76,20 +76,21 @@ std::string shared_faces_lost(const Output& output, std::span<const SharedGroup>
   const bool holds_one = output.part == Part::boundary ||
                          (output.format().groups_written != Held::none && !output.format().holds_all_groups_of_faces());
   if (!holds_one || output.part == Part::cutaway || output.is_page()) return {};
-  constexpr std::size_t kMostListed = 5;
+  constexpr std::size_t kMostListedGroups = 5;
   std::size_t num_groups = 0;
   std::string list;
   for (const SharedGroup& group : shared) {
     const std::size_t faces = of_boundary ? group.boundary_faces : group.faces,
                       lost = of_boundary ? group.boundary_lost : group.lost;
-    if (lost == 0 || ++num_groups > kMostListed) continue;
+    if (lost == 0 || ++num_groups > kMostListedGroups) continue;
     list +=
         (list.empty() ? "" : ", ") + quoted_label(group.label) + " loses " +
         (faces == 1 ? "its only face"
                     : (lost == faces ? "all" : std::to_string(lost)) + " of its " + std::to_string(faces) + " faces");
   }
   if (list.empty()) return {};
-  if (num_groups > kMostListed) list += ", and " + std::to_string(num_groups - kMostListed) + " more groups lose faces";
+  if (num_groups > kMostListedGroups)
+    list += ", and " + std::to_string(num_groups - kMostListedGroups) + " more groups lose faces";
   return output.path.string() + ": this format holds one group for each face, and faces are in several: the group " +
          list + "; take .msh, .vtu, .inp or .e";
 }

@@ -55,9 +55,9 @@ std::string heading(const Json& report) {
 std::string color_scale(const ReportPicture& picture) {
   if (picture.high.empty()) return {};
   std::string text = "<span class=\"scale\">" + escaped(picture.low) + "<i style=\"background:linear-gradient(90deg";
-  constexpr int kStops = 8;
-  for (int i = 0; i <= kStops; ++i) {
-    const LinearColor color = quality_color(std::max(1e-9, double(i) / kStops));
+  constexpr int kColorScaleSteps = 8;
+  for (int i = 0; i <= kColorScaleSteps; ++i) {
+    const LinearColor color = quality_color(std::max(1e-9, double(i) / kColorScaleSteps));
     text += ",rgb(";
     for (int k = 0; k < 3; ++k)
       text += formatted(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
@@ -141,14 +141,15 @@ std::string trials(const Json& report) {
 }
 
 std::string missed_edges(const Json& report) {
-  constexpr std::size_t kMostRows = 30;
+  constexpr std::size_t kMostMissedEdgeRows = 30;
   const Json edges = report.value("edges_not_followed", Json::array());
   std::string rows;
-  for (std::size_t i = 0; i < std::min(edges.size(), kMostRows); ++i)
+  for (std::size_t i = 0; i < std::min(edges.size(), kMostMissedEdgeRows); ++i)
     rows += row({words(edges[i].at("length_percent")), place(edges[i].at("at")), words(edges[i].at("why"))});
   if (rows.empty()) return "";
   std::string text = table({"length, % of diagonal", "place", "why"}, rows);
-  if (edges.size() > kMostRows) text += formatted("<p>... and %zu more</p>\n", edges.size() - kMostRows);
+  if (edges.size() > kMostMissedEdgeRows)
+    text += formatted("<p>... and %zu more</p>\n", edges.size() - kMostMissedEdgeRows);
   return text;
 }
 
@@ -248,10 +249,11 @@ std::string warnings(const Json& report) {
 }  // namespace
 
 Json parse_report(std::string_view bytes, const std::string& name) {
-  constexpr int kDeepest = 20;
+  constexpr int kDeepestReportNesting = 20;
   const auto shallow = [&](int depth, Json::parse_event_t, const Json&) {
-    if (depth > kDeepest) throw InputError(name + ": expected a report, found values nested more than " +
-                                           std::to_string(kDeepest) + " deep");
+    if (depth > kDeepestReportNesting)
+      throw InputError(name + ": expected a report, found values nested more than " +
+                       std::to_string(kDeepestReportNesting) + " deep");
     return true;
   };
   Json report;

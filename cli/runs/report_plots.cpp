@@ -14,11 +14,12 @@ namespace subvol::cli {
 using namespace internal;
 namespace {
 
-constexpr double kWidth = 640, kHeight = 240, kLeft = 48, kBottom = 20, kTop = 10;
+constexpr double kPlotWidth = 640, kPlotHeight = 240, kPlotLeftMargin = 48, kPlotBottomMargin = 20, kPlotTopMargin = 10;
 
 std::string open_svg(const char* title) {
-  return formatted("<svg viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"%s\">", kWidth, kHeight, title) +
-         formatted("<path class=\"axis\" d=\"M%g %gV%gH%g\"/>", kLeft, kTop, kHeight - kBottom, kWidth);
+  return formatted("<svg viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"%s\">", kPlotWidth, kPlotHeight, title) +
+         formatted("<path class=\"axis\" d=\"M%g %gV%gH%g\"/>", kPlotLeftMargin, kPlotTopMargin,
+                   kPlotHeight - kPlotBottomMargin, kPlotWidth);
 }
 
 }  // namespace
@@ -55,27 +56,30 @@ std::string energy_plot(const Json& stages) {
   if (!(high > 0)) return {};
   const double bottom = std::floor(std::log10(low)), top = std::max(bottom + 1, std::ceil(std::log10(high)));
   const auto x = [&](double step) {
-    return kLeft + (kWidth - kLeft) * step / static_cast<double>(std::max<std::size_t>(1, num_steps - 1));
+    return kPlotLeftMargin +
+           (kPlotWidth - kPlotLeftMargin) * step / static_cast<double>(std::max<std::size_t>(1, num_steps - 1));
   };
   const auto y = [&](double e) {
     const double t = e > 0 ? (std::log10(e) - bottom) / (top - bottom) : 0;
-    return kHeight - kBottom - (kHeight - kBottom - kTop) * std::clamp(t, 0.0, 1.0);
+    return kPlotHeight - kPlotBottomMargin -
+           (kPlotHeight - kPlotBottomMargin - kPlotTopMargin) * std::clamp(t, 0.0, 1.0);
   };
   std::string svg = open_svg("energies by step");
   const int every = std::max(1, static_cast<int>((top - bottom) / 6));
   for (int decade = static_cast<int>(bottom); decade <= static_cast<int>(top); decade += every)
-    svg += formatted("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kLeft,
-                     y(std::pow(10.0, decade)), kWidth, y(std::pow(10.0, decade)) + 4, decade);
+    svg += formatted("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kPlotLeftMargin,
+                     y(std::pow(10.0, decade)), kPlotWidth, y(std::pow(10.0, decade)) + 4, decade);
   for (const std::size_t end : ends)
     if (end < num_steps)
-      svg += formatted("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
+      svg += formatted("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kPlotTopMargin,
+                       kPlotHeight - kPlotBottomMargin);
   for (std::size_t k = kTerms.size(); k-- > 0;) {
     svg += formatted("<polyline class=\"%s\" points=\"", kTerms[k]);
     for (std::size_t i = 0; i < num_steps; ++i) svg += formatted("%.1f,%.1f ", x(double(i)), y(energies[k][i]));
     svg += "\"/>";
   }
-  return svg + formatted("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5,
-                         num_steps);
+  return svg + formatted("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kPlotWidth,
+                         kPlotHeight - 5, num_steps);
 }
 
 std::string histogram_plot(const Json& counts) {
@@ -84,18 +88,20 @@ std::string histogram_plot(const Json& counts) {
   const double most = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
   if (!(most > 0)) return {};
   std::string svg = open_svg("histogram");
-  const double width = (kWidth - kLeft) / static_cast<double>(values.size());
+  const double width = (kPlotWidth - kPlotLeftMargin) / static_cast<double>(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] > 0)) continue;
-    const double height = std::max(1.0, (kHeight - kBottom - kTop) * values[i] / most);
+    const double height = std::max(1.0, (kPlotHeight - kPlotBottomMargin - kPlotTopMargin) * values[i] / most);
     svg += formatted(
         "<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
-        kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
+        kPlotLeftMargin + width * double(i) + 1, kPlotHeight - kPlotBottomMargin - height, width - 2, height,
+        values[i]);
   }
   for (int i = 0; i <= 4; ++i)
-    svg += formatted("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,
-                     kHeight - 5, i == 4 ? "end" : "middle", -1 + 0.5 * i);
-  return svg + formatted("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kTop + 10, most);
+    svg += formatted("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>",
+                     kPlotLeftMargin + (kPlotWidth - kPlotLeftMargin) * i / 4, kPlotHeight - 5,
+                     i == 4 ? "end" : "middle", -1 + 0.5 * i);
+  return svg + formatted("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kPlotTopMargin + 10, most);
 }
 
 }  // namespace subvol::cli

@@ -135,10 +135,10 @@ std::vector<double> first_heights(const ShellResult& shell, std::size_t first) {
 std::optional<std::string> inward_warning(const TriangleMesh& surface) {
   // In front of a face the winding number is 0 if the surface faces outward, and -1 if it faces inward; for a surface
   // that encloses nothing it lies in between. Small holes hardly change it.
-  constexpr double kInside = -0.9;
-  constexpr std::size_t kMostFaces = 2000;
-  constexpr double kOffset = 1e-3;  // relative to a face's size
-  const std::size_t n = surface.triangles.size(), step = (n + kMostFaces - 1) / kMostFaces;
+  constexpr double kInwardWindingNumber = -0.9;
+  constexpr std::size_t kMostProbedFaces = 2000;
+  constexpr double kFaceProbeOffset = 1e-3;  // relative to a face's size
+  const std::size_t n = surface.triangles.size(), step = (n + kMostProbedFaces - 1) / kMostProbedFaces;
   std::vector<Vec3> points;
   std::vector<double> areas;
   for (std::size_t t = 0; t < n; t += step) {
@@ -146,13 +146,14 @@ std::optional<std::string> inward_warning(const TriangleMesh& surface) {
     const Vec3 &x = surface.positions[a], &y = surface.positions[b], &z = surface.positions[c];
     const Vec3 normal = doubled_area_vector(surface, surface.triangles[t]);
     if (!(normal.norm() > 0)) continue;
-    points.push_back((x + y + z) / 3 + kOffset * normal / std::sqrt(normal.norm()));
+    points.push_back((x + y + z) / 3 + kFaceProbeOffset * normal / std::sqrt(normal.norm()));
     areas.push_back(normal.norm());
   }
   if (points.empty()) return std::nullopt;
   const std::vector<double> numbers = WindingNumber(surface).at(points);
   const double area = std::accumulate(areas.begin(), areas.end(), 0.0);
-  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kInside * area) return std::nullopt;
+  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kInwardWindingNumber * area)
+    return std::nullopt;
   const SoupTopology edges = soup_topology(surface.positions, surface.triangles);
   const bool is_closed = edges.open_edges == 0 && edges.crowded_edges == 0;
   return "the faces of this " +
@@ -318,12 +319,12 @@ Json corner_quality_json(const ShellResult& shell) {
 }
 
 std::vector<std::string> thickness_warnings(const ShellResult& shell, std::optional<double> first_height) {
-  constexpr double kLeastShare = 0.5, kMostOff = 0.1;
+  constexpr double kLeastAchievedThicknessShare = 0.5, kMostFirstHeightError = 0.1;
   std::vector<std::string> warnings;
   const std::size_t n = shell.layers.num_columns();
   for_each_side(shell.layers, [&](const char* side, std::size_t first) {
     const ThicknessFigures asked({shell.asked.data() + first, n}), found({shell.achieved.data() + first, n});
-    if (found.mean < kLeastShare * asked.mean)
+    if (found.mean < kLeastAchievedThicknessShare * asked.mean)
       warnings.push_back(
           formatted("the layers %s are %.6g thick on average, %.3g %% of what was asked: they could not grow "
                     "further",
@@ -331,7 +332,7 @@ std::vector<std::string> thickness_warnings(const ShellResult& shell, std::optio
     if (!first_height) return;
     const std::vector<double> heights = first_heights(shell, first);
     const ThicknessFigures height(heights);
-    if (std::abs(height.mean - *first_height) > kMostOff * *first_height)
+    if (std::abs(height.mean - *first_height) > kMostFirstHeightError * *first_height)
       warnings.push_back(formatted("the first layer %s is %.6g to %.6g high, %.6g on average, where %.6g was asked",
                                    side, height.least, height.most, height.mean, *first_height));
   });

@@ -21,7 +21,7 @@ namespace subvol::cli {
 using namespace internal;
 namespace {
 
-constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr float kMissingFieldValue = std::numeric_limits<float>::quiet_NaN();
 
 const VolumeMesh* linear_cells_of(const ShownMesh& mesh) { return std::get_if<VolumeMesh>(&mesh); }
 
@@ -116,7 +116,7 @@ class Measurer {
                       .label = "Distance from the target",
                       .is_on_points = true,
                       .is_high_worst = true,
-                      .values = std::vector<float>(result_.points.size(), kNone)};
+                      .values = std::vector<float>(result_.points.size(), kMissingFieldValue)};
     for (std::size_t k = 0; k < places.size(); ++k) field.values[places[k]] = static_cast<float>(hits[k].distance);
     result_.fields.push_back(std::move(field));
   }
@@ -135,7 +135,8 @@ void add_file_fields(const std::filesystem::path& path, ViewerMesh& mesh) {
                                       [&](const ViewerField& field) { return field.name == values.name; });
     if (is_taken || values.values.size() != size || (values.is_on_points && mesh.intervals > 1)) continue;
     ViewerField field{.name = values.name, .label = values.name, .is_on_points = values.is_on_points};
-    for (const double x : values.values) field.values.push_back(std::isfinite(x) ? static_cast<float>(x) : kNone);
+    for (const double x : values.values)
+      field.values.push_back(std::isfinite(x) ? static_cast<float>(x) : kMissingFieldValue);
     mesh.fields.push_back(std::move(field));
   }
 }

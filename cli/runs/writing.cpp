@@ -305,8 +305,8 @@ void write_polygons(const Output& output, const TessellatedSurface& limit, const
 void write_animation(const Output& output, const VolumeMesh& cage, const VolumeMesh& result,
                      std::span<const FitState> states, const WritingOptions& options) {
   if (!output.is_page()) return write_scene(output.path, animation_scene(cage, states, scene_options(output, options)));
-  constexpr std::size_t kMostCells = 500'000;  // of all moments together: a page of 15 MB
-  const std::size_t most = std::min(result.num_cells(), kMostCells / (states.size() + 1));
+  constexpr std::size_t kMostAnimatedCells = 500'000;  // of all moments together: a page of 15 MB
+  const std::size_t most = std::min(result.num_cells(), kMostAnimatedCells / (states.size() + 1));
   int levels = 0;
   for (std::size_t cells = cage.cell_vertices.size(); cells <= most && cage.num_cells() < result.num_cells();
        cells *= 8)

@@ -83,9 +83,9 @@ void AutomaticFitRun::load() {
 /// Returns the number of cubes of an edge length that fill a volume. UsageError: there are too many.
 std::size_t cells_of_size(double volume, double size) {
   const double cells = volume / std::pow(size, 3);
-  if (!(cells <= static_cast<double>(kMostCells)))
+  if (!(cells <= static_cast<double>(kMostRequestedCells)))
     throw UsageError(formatted("--size %g: the target would need %.3g cells, expected at most %zu", size, cells,
-                               kMostCells));
+                               kMostRequestedCells));
   return std::max(kLeastTemplateCells, static_cast<std::size_t>(std::lround(cells)));
 }
 

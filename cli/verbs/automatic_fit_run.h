@@ -15,7 +15,7 @@
 namespace subvol::cli {
 
 /// Largest number of cells that a fit may be asked for.
-inline constexpr std::size_t kMostCells = 8 * kMostTemplateCells;
+inline constexpr std::size_t kMostRequestedCells = 8 * kMostTemplateCells;
 
 /// Arguments of `fit` without a template, for a mesh whose vertices are all free, or for a cage and its mesh.
 struct AutomaticFitArguments {

@@ -154,13 +154,16 @@ std::vector<fs::path> paths_of(const std::vector<std::string>& names) { return {
 
 /// A path as an address of a link.
 std::string address_of(const fs::path& path) {
-  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/+=";
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  constexpr std::string_view kPlainAddressCharacters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/+=";
+  constexpr std::string_view kHexadecimalDigits = "0123456789ABCDEF";
   std::string address;
   for (const char c : path.generic_string()) {
     const auto byte = static_cast<unsigned char>(c);
-    if (kPlain.find(c) != std::string_view::npos) address += c;
-    else (address += '%', address += kDigits[byte >> 4], address += kDigits[byte & 15]);
+    if (kPlainAddressCharacters.find(c) != std::string_view::npos)
+      address += c;
+    else
+      (address += '%', address += kHexadecimalDigits[byte >> 4], address += kHexadecimalDigits[byte & 15]);
   }
   return address;
 }

@@ -320,7 +320,7 @@ void add_fit_command(CLI::App& app, Action& action) {
   verb->add_option("--cells", arguments->cells,
                    "How many cells the result has at most; about so many with --order or options of the method\n"
                    "(default: as many as it needs)")
-      ->check(whole_number_in(kLeastTemplateCells, kMostCells))
+      ->check(whole_number_in(kLeastTemplateCells, kMostRequestedCells))
       ->type_name("N")
       ->excludes(file);
   verb->add_option("--size", arguments->size,

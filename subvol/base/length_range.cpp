@@ -8,9 +8,10 @@
 namespace subvol::internal {
 
 void require_length(double extent, const char* what) {
-  if (extent >= kLeastLength && extent <= kMostLength) return;
+  if (extent >= kLeastSupportedLength && extent <= kMostSupportedLength) return;
   std::ostringstream said;
-  said << what << ": its extent is " << extent << ", expected " << kLeastLength << " to " << kMostLength;
+  said << what << ": its extent is " << extent << ", expected " << kLeastSupportedLength << " to "
+       << kMostSupportedLength;
   throw InputError(said.str());
 }
 

@@ -28,12 +28,12 @@ std::optional<Number> parse(std::string_view word) {
 
 constexpr std::size_t kNotFound = std::string_view::npos;
 
-/// Returns true if the first kUnits units of two bytes (or all of them, if there are fewer but at least one) are
-/// printable or blank ASCII. zero: which byte of a unit must be 0; 0 for big-endian, 1 for little-endian.
+/// Returns true if the first kProbedWideUnits units of two bytes (or all of them, if there are fewer but at least one)
+/// are printable or blank ASCII. zero: which byte of a unit must be 0; 0 for big-endian, 1 for little-endian.
 bool has_wide_ascii(std::string_view bytes, std::size_t zero) {
-  constexpr std::size_t kUnits = 4;  // more than a binary file has of such bytes by chance
+  constexpr std::size_t kProbedWideUnits = 4;  // more than a binary file has of such bytes by chance
   if (bytes.size() < 2) return false;
-  for (std::size_t i = 0; i < std::min(bytes.size() / 2, kUnits); ++i) {
+  for (std::size_t i = 0; i < std::min(bytes.size() / 2, kProbedWideUnits); ++i) {
     const char c = bytes[2 * i + 1 - zero];
     if (bytes[2 * i + zero] != 0 || !(is_blank(c) || (c > ' ' && c <= '~'))) return false;
   }
@@ -71,10 +71,10 @@ std::string read_file(const std::filesystem::path& path) {
 }
 
 std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
+  constexpr std::string_view kTrimmedBlanks = " \t\r";
+  const std::size_t begin = text.find_first_not_of(kTrimmedBlanks);
   if (begin == std::string_view::npos) return {};
-  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
+  return std::string(text.substr(begin, text.find_last_not_of(kTrimmedBlanks) + 1 - begin));
 }
 
 TextScanner::TextScanner(std::string name, std::string_view bytes, Comments comments)
@@ -199,10 +199,10 @@ std::optional<double> parse_number(std::string_view word) {
 std::optional<std::int64_t> parse_integer(std::string_view word) { return parse<std::int64_t>(word); }
 
 std::string in_quotes(std::string_view word) {
-  constexpr std::size_t kLongest = 40;  // characters
+  constexpr std::size_t kLongestQuotedWord = 40;  // characters
   std::string text = "'";
-  for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
-  return text + (word.size() > kLongest ? "...'" : "'");
+  for (const char c : word.substr(0, kLongestQuotedWord)) text += c >= ' ' && c <= '~' ? c : '?';
+  return text + (word.size() > kLongestQuotedWord ? "...'" : "'");
 }
 
 std::string lower_case(std::string_view text) {

@@ -124,7 +124,8 @@ void take_counts(LabelGrid& grid, std::span<const double> sizes, const FileText&
 
 void require_sound_axes(const LabelGrid& grid, const FileText& file) {
   const double largest = grid.edges.cwiseAbs().maxCoeff();
-  if (!grid.edges.allFinite() || !grid.origin.allFinite() || !(largest >= kLeastLength && largest <= kMostLength) ||
+  if (!grid.edges.allFinite() || !grid.origin.allFinite() ||
+      !(largest >= kLeastSupportedLength && largest <= kMostSupportedLength) ||
       !(std::abs(grid.edges.determinant()) > 1e-9 * std::pow(largest, 3)))
     file.fail("its voxels have no volume, or a place that is not finite");
 }

@@ -164,10 +164,10 @@ void check_extent(const std::vector<Vec3>& positions, const Remarks& remarks) {
   const double largest = std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
   const double extent = (upper - lower).maxCoeff();
   std::string figure;
-  append_number(figure, largest > kMostLength ? largest : extent);
-  if (largest > kMostLength)
+  append_number(figure, largest > kMostSupportedLength ? largest : extent);
+  if (largest > kMostSupportedLength)
     remarks.fail("coordinates up to " + figure + ": areas overflow; scale the surface down");
-  if (extent < kLeastLength)
+  if (extent < kLeastSupportedLength)
     remarks.fail("the bounding box is only " + figure + " wide: areas underflow; scale it up");
 }
 

@@ -28,8 +28,8 @@ inline constexpr std::size_t kMaxPolygonCorners = 1000;
 ///
 /// Throws InputError with the file and, for its contents, the line (binary: byte) for anything malformed, counts beyond
 /// what the file can hold, indices out of range, numbers that are not finite, polygons of more than kMaxPolygonCorners,
-/// no faces, all vertices in one place, coordinates beyond kMostLength, and an extent below kLeastLength. Memory: a few
-/// times the size of the file, whatever it claims.
+/// no faces, all vertices in one place, coordinates beyond kMostSupportedLength, and an extent below
+/// kLeastSupportedLength. Memory: a few times the size of the file, whatever it claims.
 PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
 /// Returns true if .fbx and .dae can be read.
