@@ -14,7 +14,7 @@ namespace {
 
 // Found on twelve CAD parts, like the constants of feature_routing.cpp. Lengths are in units of h.
 /// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
-constexpr double kReach = 1.6;
+constexpr double kCornerReach = 1.6;
 /// Costs of a corner's vertex: for each curve without an edge of the wanted number of cells; if edges are missing.
 constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
 /// Cost of a vertex so far from the corner that only joining paths may end there: more than that of missing edges.
@@ -54,8 +54,8 @@ void CornerPlacement::find_needs(const SignedFeatures& features, std::span<const
 void CornerPlacement::place() {
   std::vector<std::tuple<double, Index, Index>> pairs;  // cost, corner, vertex
   for (const auto& [corner, needs] : needs_)
-    for (const Index v : graph_.vertices_near(needs.position, kReach * h_))
-      if (distance(needs, v) <= kReach) pairs.push_back({cost(needs, v), corner, v});
+    for (const Index v : graph_.vertices_near(needs.position, kCornerReach * h_))
+      if (distance(needs, v) <= kCornerReach) pairs.push_back({cost(needs, v), corner, v});
   std::sort(pairs.begin(), pairs.end());
   for (const auto& [cost, corner, v] : pairs) {
     if (taken_[v] || vertex_of_corner_.contains(corner)) continue;

@@ -18,9 +18,9 @@ namespace {
 /// Divides a segment into at most 1e5 equal parts, no longer than `spacing` otherwise; calls visit(midpoint, length).
 template <class Visit>
 void sample_segment(const Vec3& a, const Vec3& b, double spacing, const Visit& visit) {
-  constexpr double kMostParts = 1e5;
+  constexpr double kMostSegmentParts = 1e5;
   const double length = (b - a).norm();
-  const int parts = static_cast<int>(std::min(kMostParts, std::max(1.0, std::ceil(length / spacing))));
+  const int parts = static_cast<int>(std::min(kMostSegmentParts, std::max(1.0, std::ceil(length / spacing))));
   for (int k = 0; k < parts; ++k) visit(Vec3(a + (b - a) * ((k + 0.5) / parts)), length / parts);
 }
 

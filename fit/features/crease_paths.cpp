@@ -20,7 +20,7 @@ namespace {
 
 /// As shares of a mean edge length: epsilon of a path's integral; largest distance of a corner from its vertex; largest
 /// distance between a path and its curve; length below which a curve is skipped.
-constexpr double kLengthShare = 0.05, kCornerShare = 1.0, kFollowShare = 0.75, kLeastLength = 0.25;
+constexpr double kLengthShare = 0.05, kCornerShare = 1.0, kFollowShare = 0.75, kLeastCreaseLength = 0.25;
 /// Number of vertices that are tried for an end at which a feature runs out.
 constexpr std::size_t kNumTried = 4;
 
@@ -128,7 +128,7 @@ class PathFinder {
 
   std::optional<Found> follow(Index c) const {
     const FeatureCurve& curve = curves_.curves[c];
-    if (curve.length() < kLeastLength * graph_.mean_length) return std::nullopt;
+    if (curve.length() < kLeastCreaseLength * graph_.mean_length) return std::nullopt;
     if (curve.closed()) return around(curve);
     std::optional<Found> best;
     std::optional<std::vector<MiddlePlace>> middles;  // computed only if needed: most curves need none
@@ -204,7 +204,7 @@ class PathFinder {
 
   /// Returns the vertices nearest to the middle half of the curve: enough that one is left if any two are excluded.
   std::vector<MiddlePlace> middle_places(std::span<const Vec3> points) const {
-    constexpr std::size_t kEnough = 3;  // one more than can be excluded
+    constexpr std::size_t kEnoughMiddlePlaces = 3;  // one more than can be excluded
     std::vector<double> along = {0};
     for (std::size_t i = 1; i < points.size(); ++i) along.push_back(along.back() + (points[i] - points[i - 1]).norm());
     const ClosestPoint tree = polyline_tree(points);
@@ -216,9 +216,9 @@ class PathFinder {
       if (at < along.back() / 4 || at > along.back() * 3 / 4) continue;
       const auto distance = [](const MiddlePlace& p) { return p.hit.distance; };
       const auto place = std::ranges::upper_bound(nearest, hit.distance, {}, distance);
-      if (place == nearest.end() && nearest.size() == kEnough) continue;
+      if (place == nearest.end() && nearest.size() == kEnoughMiddlePlaces) continue;
       nearest.insert(place, MiddlePlace{v, hit});
-      if (nearest.size() > kEnough) nearest.pop_back();
+      if (nearest.size() > kEnoughMiddlePlaces) nearest.pop_back();
     }
     return nearest;
   }

@@ -62,14 +62,15 @@ class Bends {
   }
 
   bool is_crisp(Index v, Index w) const {
-    constexpr double kMostShare = 1.0 / 3;  // of the edge's angle: the edges around it must bend less than that
+    // Of the edge's angle: the edges around it must bend less than that.
+    constexpr double kMostNeighborBendShare = 1.0 / 3;
     const Index edge = find(v, w);
     if (edge == kNoIndex) return false;
     double others = 0;
     for (const SurfaceHalfEdge& side : edges_[edge].sides)
       for (const Index e : edges_of_[side.triangle])
         if (!edges_[e].on_curve) others = std::max(others, edges_[e].angle);
-    return others < kMostShare * edges_[edge].angle;
+    return others < kMostNeighborBendShare * edges_[edge].angle;
   }
 
  private:
@@ -81,7 +82,7 @@ class Bends {
 
   /// Marks the triangles of planes: connected triangles, two or more, whose normals are those of the largest one.
   void find_planes(std::span<const Vec3> normals) {
-    constexpr double kSameNormal = 0.5;  // degrees; normals of coordinates in single precision differ by less
+    constexpr double kMostPlaneNormalAngle = 0.5;  // degrees; normals of coordinates in single precision differ by less
     constexpr double kLeastArea = 1e-4;  // share of the squared diagonal
     std::vector<Index> by_area(areas_.size());
     std::iota(by_area.begin(), by_area.end(), Index{0});
@@ -99,7 +100,7 @@ class Bends {
         for (const Index e : edges_of_[patch[i]])
           for (const SurfaceHalfEdge& side : edges_[e].sides) {
             const double angle = angle_degrees_between(normals[seed], normals[side.triangle]);
-            if (visited[side.triangle] || std::min(angle, 180 - angle) > kSameNormal) continue;
+            if (visited[side.triangle] || std::min(angle, 180 - angle) > kMostPlaneNormalAngle) continue;
             visited[side.triangle] = true;
             patch.push_back(side.triangle);
           }
@@ -155,8 +156,8 @@ class PartDiagonals {
 }  // namespace
 
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves) {
-  constexpr double kLong = 0.03;  // share of the diagonal
-  constexpr double kMost = 0.5;   // share of a curve's length that is crisp
+  constexpr double kLongCurveShare = 0.03;  // of the diagonal
+  constexpr double kCrispCurveShare = 0.5;  // of a curve's length
   EdgeCrispness result;
   if (curves.empty()) return result;
   const Bends bends(mesh, curves);
@@ -172,7 +173,8 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
     const double length = curve.length();
     all += length;
     crisp += crisp_here;
-    if (length > kLong * diagonals.at(curve.vertices[0]) && crisp_here > kMost * length) long_crisp += length;
+    if (length > kLongCurveShare * diagonals.at(curve.vertices[0]) && crisp_here > kCrispCurveShare * length)
+      long_crisp += length;
   }
   if (all > 0) {
     result.crisp_share = crisp / all;

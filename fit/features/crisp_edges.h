@@ -33,12 +33,13 @@ struct EdgeCrispness {
   /// - Parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
     // Relative length that counts as much as a crisp share of 1, and the factor on the planar share.
-    constexpr double kLong = 15, kOfPlanes = 2;
+    constexpr double kFullCrispLength = 15, kPlanarShareFactor = 2;
     constexpr double kLeastSum = 1.04, kLeastSumOfPlanes = 1.4;
-    constexpr double kLeastLength = 0.3;  // more than the rim of a hole that was covered in a scan
-    const double crisp = crisp_share + relative_length / kLong;
+    constexpr double kLeastPlanarLength = 0.3;  // more than the rim of a hole that was covered in a scan
+    const double crisp = crisp_share + relative_length / kFullCrispLength;
     return (crisp_share >= 0.5 && relative_length >= 1 && crisp >= kLeastSum) ||
-           (relative_planar_length >= kLeastLength && crisp + kOfPlanes * planar_share >= kLeastSumOfPlanes);
+           (relative_planar_length >= kLeastPlanarLength &&
+            crisp + kPlanarShareFactor * planar_share >= kLeastSumOfPlanes);
   }
 };
 

@@ -13,9 +13,9 @@ namespace subvol::internal {
 namespace {
 
 // Lengths are in units of h.
-constexpr double kLeastPart = 3;     // of a part
-constexpr double kLeastGap = 1;      // between two parts
-constexpr double kLeastShare = 0.5;  // of the curve that all parts must follow
+constexpr double kLeastPartLength = 3;
+constexpr double kLeastPartGap = 1;          // between two parts
+constexpr double kLeastFollowedShare = 0.5;  // of the curve, by all parts
 
 /// A part of a curve, from one place to another.
 using Interval = std::pair<double, double>;
@@ -51,8 +51,8 @@ class PartSearch {
       left.pop_back();
       const std::optional<Interval> longest = longest_in(all);
       if (!longest) continue;
-      left.push_back({all.first, longest->first - kLeastGap * h_});
-      left.push_back({longest->second + kLeastGap * h_, all.second});
+      left.push_back({all.first, longest->first - kLeastPartGap * h_});
+      left.push_back({longest->second + kLeastPartGap * h_, all.second});
     }
     double followed = 0;
     for (PartPath& found : found_) {
@@ -61,7 +61,7 @@ class PartSearch {
       found.part.from -= turns;
       found.part.to -= turns;
     }
-    if (followed < kLeastShare * length) return {};
+    if (followed < kLeastFollowedShare * length) return {};
     std::ranges::sort(found_, {}, [](const PartPath& found) { return found.part.from; });
     return std::move(found_);
   }
@@ -81,7 +81,7 @@ class PartSearch {
     std::vector<Interval> parts;
     for (const double from : places)
       for (const double to : places)
-        if (to - from >= kLeastPart * h_) parts.push_back({from, to});
+        if (to - from >= kLeastPartLength * h_) parts.push_back({from, to});
     std::ranges::stable_sort(parts, std::greater{}, length_of);
     for (const Interval& part : parts)
       if (find(part)) return part;
@@ -90,18 +90,18 @@ class PartSearch {
 
   /// Finds the longest part of a closed curve, if one is long enough. Returns what is left.
   Interval cut_open() {
-    constexpr int kPlaces = 8;  // starts that are tried, evenly spread along the curve
+    constexpr int kClosedCurveStarts = 8;  // that are tried, evenly spread along the curve
     const double length = curve_.length();
     std::vector<Interval> parts;
-    for (int k = 0; k < kPlaces; ++k) {
-      const double from = length * k / kPlaces;
+    for (int k = 0; k < kClosedCurveStarts; ++k) {
+      const double from = length * k / kClosedCurveStarts;
       for (const double to : places_in({from, from + length}, h_))
-        if (to - from >= std::max(kLeastPart * h_, kLeastShare * length) && to - from < length)
+        if (to - from >= std::max(kLeastPartLength * h_, kLeastFollowedShare * length) && to - from < length)
           parts.push_back({from, to});
     }
     std::ranges::stable_sort(parts, std::greater{}, length_of);
     for (const Interval& part : parts)
-      if (find(part)) return {part.second + kLeastGap * h_, part.first + length - kLeastGap * h_};
+      if (find(part)) return {part.second + kLeastPartGap * h_, part.first + length - kLeastPartGap * h_};
     return {0, 0};
   }
 
@@ -119,7 +119,7 @@ class PartSearch {
 std::vector<PartPath> find_parts(const CurveSearch& search, const RoutingGraph& graph, const FeatureCurves& curves,
                                  Index c, const Occupied& occupied) {
   const double h = graph.edge_length();
-  if (!(h > 0) || curves.curves[c].length() < kLeastPart * h) return {};
+  if (!(h > 0) || curves.curves[c].length() < kLeastPartLength * h) return {};
   return PartSearch(search, graph, curves.curves[c], c, occupied).run();
 }
 

@@ -29,7 +29,7 @@ constexpr double kJoinPenalty = 0.3;
 /// Number of edges along another path, from their corner, within which a path may join it; no farther than its middle.
 constexpr std::size_t kJoinEdges = 3;
 /// Largest number of rounds in which corners and paths are chosen again, each from the other.
-constexpr int kRounds = 8;
+constexpr int kRoutingRounds = 8;
 /// Cost of a corner's vertex on the path of another curve, for corners that give way.
 constexpr double kOnWayPenalty = 1;
 /// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
@@ -98,7 +98,7 @@ class Router {
   /// Finds paths of whole curves.
   void run() {
     std::vector<Index> order = order_by_gap();
-    for (int round = 0; round < kRounds && !order.empty(); ++round) {
+    for (int round = 0; round < kRoutingRounds && !order.empty(); ++round) {
       const std::vector<std::uint8_t> failed = run_round(order);
       const auto has_failed = [&](Index c) { return failed[c] != 0; };
       if (std::ranges::none_of(order, has_failed)) break;

@@ -15,8 +15,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kMaxUnfoldings = 5;  // rounds; each adds tags, and few need a second one
-constexpr double kMost = 0.5;      // share of the length of the target's sharp edges
+constexpr int kMaxUnfoldings = 5;           // rounds; each adds tags, and few need a second one
+constexpr double kLeastHoldingShare = 0.5;  // of the length of the target's sharp edges
 
 /// Adds tags that keep sheets from folding at corners. A crease added at one corner may leave a span of more than 180
 /// degrees at another.
@@ -149,7 +149,7 @@ double FollowedCreases::followed_share() const {
   return all > 0 ? followed / all : 0;
 }
 
-bool FollowedCreases::hold_the_surface() const { return followed_share() > kMost; }
+bool FollowedCreases::hold_the_surface() const { return followed_share() > kLeastHoldingShare; }
 
 void FollowedCreases::release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh) {
   std::vector<CreaseEdge>& creases = mesh.tags.creases;

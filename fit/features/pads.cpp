@@ -21,7 +21,7 @@ namespace {
 /// edges.
 constexpr double kDepth = 0.2;
 /// Cosine above which two faces count as one plane: those of a grid are along its axes.
-constexpr double kSameNormal = 0.9;
+constexpr double kSamePlaneCosine = 0.9;
 constexpr int kShortenings = 20;  // halvings of a step: 1e-6 of it is none
 
 using CellFaces = std::array<Index, kMaxCellFaces>;  ///< something for each local face of a cell
@@ -115,7 +115,7 @@ class PadBuilder {
     for (Index f : padded_) {
       const Vec3 n = normal_of_face(old_.mesh.positions, face(f));
       for (Index v : face(f))
-        if (std::ranges::none_of(normals[v], [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
+        if (std::ranges::none_of(normals[v], [&](const Vec3& m) { return m.dot(n) > kSamePlaneCosine; }))
           normals[v].push_back(n);
     }
     return normals;

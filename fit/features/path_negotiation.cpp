@@ -13,9 +13,9 @@ namespace {
 
 /// In units of h^3, an edge on its curve costs about 0.02, and one that is h off costs 1. The first price of another
 /// path makes no detour; that of the last round, 44, makes every detour within reach. Not tuned.
-constexpr int kMostRounds = 20;
+constexpr int kMostNegotiationRounds = 20;
 /// The price grows by this factor from round to round. A place where several paths met costs this much more per round.
-constexpr double kFirstPrice = 0.02, kGrowth = 1.5, kPriceOfHistory = 0.1;
+constexpr double kFirstPrice = 0.02, kPriceGrowth = 1.5, kPriceOfHistory = 0.1;
 
 /// Number of paths at each vertex or edge, and the number of rounds that ended with several there.
 struct Use {
@@ -39,8 +39,8 @@ class Negotiation {
 
   std::vector<std::vector<Index>> run(std::span<const Index> curves, CurveSearch& search) {
     std::vector<std::uint8_t> is_hopeless(paths_.size(), 0);  // no path is near, whatever the prices
-    for (int round = 0; round < kMostRounds; ++round) {
-      begin_round(kFirstPrice * std::pow(kGrowth, round));
+    for (int round = 0; round < kMostNegotiationRounds; ++round) {
+      begin_round(kFirstPrice * std::pow(kPriceGrowth, round));
       for (const Index c : curves) {
         if (is_hopeless[c] || (!paths_[c].empty() && !shares(paths_[c]))) continue;
         count(paths_[c], -1);

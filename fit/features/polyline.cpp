@@ -22,8 +22,8 @@ ClosestPoint polyline_tree(std::span<const Vec3> points) {
 }
 
 std::vector<Vec3> sampled_polyline(std::span<const Vec3> points, double spacing) {
-  constexpr double kMostSamples = 1e5;
-  const double step = std::max(spacing, polyline_length(points) / kMostSamples);
+  constexpr double kMostPolylineSamples = 1e5;
+  const double step = std::max(spacing, polyline_length(points) / kMostPolylineSamples);
   std::vector<Vec3> samples = {points[0]};
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     const double length = (points[i + 1] - points[i]).norm();

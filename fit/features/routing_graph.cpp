@@ -51,9 +51,9 @@ Index RoutingGraph::edge_between(Index v, Index w) const {
 }
 
 std::vector<Index> RoutingGraph::vertices_near(const Vec3& point, double distance) const {
-  constexpr double kRoom = 1.01;  // the tree rounds differently
+  constexpr double kBallRoundingRoom = 1.01;  // the tree rounds differently
   std::vector<Index> places, found;
-  const SiteTree::Ball ball{point, kRoom * distance * distance};
+  const SiteTree::Ball ball{point, kBallRoundingRoom * distance * distance};
   if (!vertices_.empty()) tree_.gather({&ball, 1}, vertices_.size(), places);
   for (Index place : places)
     if (const Index v = vertices_[tree_.site(place)]; (position(v) - point).norm() <= distance) found.push_back(v);
@@ -69,9 +69,9 @@ void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
 }
 
 bool has_edge_on(const RoutingGraph& graph, const FeatureCurve& curve) {
-  constexpr double kNear = 0.05;  // share of the length
+  constexpr double kEdgeOnCurveTolerance = 0.05;  // share of the length
   if (graph.edges().empty()) return false;
-  const double length = curve.length(), most = kNear * length;
+  const double length = curve.length(), most = kEdgeOnCurveTolerance * length;
   const Vec3 &front = curve.points.front(), &back = curve.points.back();
   const Index v = graph.nearest_vertex(front), w = graph.nearest_vertex(back);
   if ((graph.position(v) - front).norm() > most || (graph.position(w) - back).norm() > most) return false;

@@ -63,17 +63,18 @@ std::size_t divide(const MeshTopology& topology, const SheetFaces& sheets, std::
 }  // namespace
 
 SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angle_degrees) {
-  constexpr double kNone = 180, kSharp = 90, kFlat = 180;  // degrees; no bend is above kNone
+  constexpr double kMostBendAngle = 180;                             // degrees; no bend is above it
+  constexpr double kSheetJunctionAngle = 90, kFlatSheetAngle = 180;  // degrees
   SheetCurves result;
   const std::vector<std::array<Index, 2>> junctions = curve_edges(target);
   SignedFeatures& features = result.features;
-  features.curves = feature_curves(target.mesh, angle_degrees.value_or(kNone), junctions);
+  features.curves = feature_curves(target.mesh, angle_degrees.value_or(kMostBendAngle), junctions);
   std::set<std::array<Index, 2>> on_curves;
   for (const FeatureCurve& curve : features.curves.curves) {
     const auto [low, high] = std::minmax(curve.vertices[0], curve.vertices[1]);
     const bool is_junction = std::ranges::binary_search(junctions, std::array<Index, 2>{low, high});
     result.are_junctions.push_back(is_junction);
-    features.angles.push_back(is_junction ? kSharp : kFlat);
+    features.angles.push_back(is_junction ? kSheetJunctionAngle : kFlatSheetAngle);
     features.segment_angles.emplace_back(curve.vertices.size() - 1, features.angles.back());
     for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
       const auto [a, b] = std::minmax(curve.vertices[i], curve.vertices[i + 1]);

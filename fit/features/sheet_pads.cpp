@@ -17,7 +17,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kFlat = 180;  // degrees
+constexpr double kFlatSheetAngle = 180;  // degrees
 
 /// Returns the boundary of a body, some of the regions, oriented outward and on the vertices of the target.
 TriangleMesh boundary_of_body(const RegionSurface& target, const std::set<int>& references) {
@@ -62,7 +62,7 @@ SignedFeatures features_of_body(const TriangleMesh& surface, const FeatureCurves
     }
   SignedFeatures result;
   result.curves = curves;
-  result.angles.assign(curves.curves.size(), kFlat);
+  result.angles.assign(curves.curves.size(), kFlatSheetAngle);
   const SignedFeatures measured = signed_features(surface, std::move(some));
   for (std::size_t i = 0; i < places.size(); ++i) result.angles[places[i]] = measured.angles[i];
   return result;

@@ -70,7 +70,8 @@ void check(const TriangleMesh& mesh) {
 
 }  // namespace
 
-/// Halves the range until it has kWidth parts or no part is larger than a leaf; calls split(lower, upper) for each cut.
+/// Halves the range until it has kTreeWidth parts or no part is larger than a leaf; calls split(lower, upper) for each
+/// cut.
 template <class Split>
 ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
   Parts parts{{range}};
@@ -78,7 +79,7 @@ ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
     for (int i = 0, existing = parts.count; i < existing; ++i) {
       Range& part = parts.ranges[i];
       const Index size = part.end - part.begin;
-      if (size <= kWidth) continue;
+      if (size <= kTreeWidth) continue;
       const Range upper{part.begin + size / 2, part.end};
       part.end = upper.begin;
       split(part, upper);
@@ -105,7 +106,7 @@ void ClosestPoint::partition(std::vector<Item>& items, Range range) {
   });
   for (int i = 0; i < parts.count; ++i) {
     const Range part = parts.ranges[i];
-    if (part.end - part.begin <= kWidth) continue;
+    if (part.end - part.begin <= kTreeWidth) continue;
 #pragma omp task shared(items) firstprivate(part) if (part.end - part.begin > kLeastTask)
     partition(items, part);
   }
@@ -117,9 +118,9 @@ Index ClosestPoint::add_node(Range range) {
   const Parts parts = parts_of(range, [](Range, Range) {});
   const Index number = static_cast<Index>(nodes_.size());
   nodes_.emplace_back();
-  for (int c = 0; c < kWidth; ++c) {
+  for (int c = 0; c < kTreeWidth; ++c) {
     Index child = kNoIndex;
-    const bool is_leaf = c < parts.count && parts.ranges[c].end - parts.ranges[c].begin <= kWidth;
+    const bool is_leaf = c < parts.count && parts.ranges[c].end - parts.ranges[c].begin <= kTreeWidth;
     if (is_leaf) {
       child = static_cast<Index>(leaf_ranges_.size());
       leaf_ranges_.push_back(parts.ranges[c]);
@@ -143,7 +144,7 @@ void ClosestPoint::fit_boxes() {
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
     const Range range = leaf_ranges_[i];
     Leaf& leaf = leaves_[i];
-    for (int lane = 0; lane < kWidth; ++lane) {
+    for (int lane = 0; lane < kTreeWidth; ++lane) {
       const Index t = order_[range.begin + (lane < range.end - range.begin ? lane : 0)];
       const auto& x = corners_[t];
       for (const Vec3& p : x) of_leaf[i] = {of_leaf[i].low.cwiseMin(p), of_leaf[i].high.cwiseMax(p)};
@@ -162,7 +163,7 @@ void ClosestPoint::fit_boxes() {
     }
   }
   for (std::size_t i = nodes_.size(); i-- > 0;)
-    for (int c = 0; c < kWidth; ++c) {
+    for (int c = 0; c < kTreeWidth; ++c) {
       const Index child = nodes_[i].child[c];
       const Box box = child == kNoIndex ? Box{} : nodes_[i].is_leaf[c] ? of_leaf[child] : of_node[child];
       for (int axis = 0; axis < 3; ++axis) {
@@ -211,9 +212,9 @@ void ClosestPoint::move(std::span<const Vec3> positions) {
 /// inside, else that to the closest edge.
 void ClosestPoint::visit(const Leaf& leaf, const Vec3& p, Index& best, double& best_squared) const {
   const double px = p[0], py = p[1], pz = p[2];
-  double squared[kWidth];
+  double squared[kTreeWidth];
   // One loop body without branches, so that it compiles to vector instructions.
-  for (int i = 0; i < kWidth; ++i) {
+  for (int i = 0; i < kTreeWidth; ++i) {
     const double bx = leaf.ab[0][i], by = leaf.ab[1][i], bz = leaf.ab[2][i];
     const double cx = leaf.ac[0][i], cy = leaf.ac[1][i], cz = leaf.ac[2][i];
     const double x = px - leaf.a[0][i], y = py - leaf.a[1][i], z = pz - leaf.a[2][i];
@@ -236,7 +237,7 @@ void ClosestPoint::visit(const Leaf& leaf, const Vec3& p, Index& best, double& b
     const double inside = leaf.inverse_area[i] > 0 ? (least < rest ? least : rest) : -1;
     squared[i] = inside >= 0 ? height * height * leaf.inverse_area[i] : edge;
   }
-  for (int i = 0; i < kWidth; ++i)
+  for (int i = 0; i < kTreeWidth; ++i)
     if (squared[i] < best_squared || (squared[i] == best_squared && leaf.triangle[i] < best)) {
       best_squared = squared[i];
       best = leaf.triangle[i];
@@ -260,8 +261,8 @@ void ClosestPoint::search(const Vec3& p, Index& best, double& best_squared) cons
       continue;
     }
     const Node& node = nodes_[next.child];
-    double squared[kWidth];
-    for (int c = 0; c < kWidth; ++c) {
+    double squared[kTreeWidth];
+    for (int c = 0; c < kTreeWidth; ++c) {
       double sum = 0;
       for (int axis = 0; axis < 3; ++axis) {
         const double below = node.low[axis][c] - p[axis], above = p[axis] - node.high[axis][c];
@@ -272,7 +273,7 @@ void ClosestPoint::search(const Vec3& p, Index& best, double& best_squared) cons
     }
     const int first = top;
     unsigned near = 0;
-    for (int c = 0; c < kWidth; ++c) near |= static_cast<unsigned>(squared[c] <= best_squared) << c;
+    for (int c = 0; c < kTreeWidth; ++c) near |= static_cast<unsigned>(squared[c] <= best_squared) << c;
     for (; near != 0; near &= near - 1) {
       const int c = std::countr_zero(near);
       if (node.child[c] == kNoIndex) continue;
@@ -313,12 +314,12 @@ void ClosestPoint::closest(std::span<const Vec3> points, std::span<Hit> hits) co
   if (points.size() != hits.size())
     throw InputError("closest point: " + std::to_string(hits.size()) + " hits for " + std::to_string(points.size()) +
                      " points");
-  constexpr std::size_t kRun = 256;  // points that share hints, whatever thread takes them
-  const std::size_t num_runs = (points.size() + kRun - 1) / kRun;
+  constexpr std::size_t kQueriesPerRun = 256;  // they share hints, whatever thread takes them
+  const std::size_t num_runs = (points.size() + kQueriesPerRun - 1) / kQueriesPerRun;
 #pragma omp parallel for schedule(dynamic) if (num_runs > 1)
   for (std::size_t run = 0; run < num_runs; ++run) {
     Index before = kNoIndex;
-    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, points.size()); ++i) {
+    for (std::size_t i = run * kQueriesPerRun; i < std::min((run + 1) * kQueriesPerRun, points.size()); ++i) {
       hits[i] = closest(points[i], hits[i].triangle == kNoIndex ? before : hits[i].triangle);
       before = hits[i].triangle;
     }

@@ -53,28 +53,28 @@ class ClosestPoint {
   std::span<const Index> order() const { return order_; }
 
  private:
-  static constexpr int kWidth = 8;  // children of a node: as many boxes as one vector instruction tests
+  static constexpr int kTreeWidth = 8;  // children of a node: as many boxes as one vector instruction tests
 
   /// Boxes of the children, coordinate by coordinate, so that all of them are tested at once.
   struct Node {
-    std::array<std::array<double, kWidth>, 3> low, high;
-    std::array<Index, kWidth> child;    ///< number of a node or leaf; kNoIndex: no child
-    std::array<bool, kWidth> is_leaf;
+    std::array<std::array<double, kTreeWidth>, 3> low, high;
+    std::array<Index, kTreeWidth> child;    ///< number of a node or leaf; kNoIndex: no child
+    std::array<bool, kTreeWidth> is_leaf;
   };
   /// Triangles, coordinate by coordinate for the same reason; unused lanes repeat the first triangle.
   struct Leaf {
-    using Lanes = std::array<double, kWidth>;
+    using Lanes = std::array<double, kTreeWidth>;
     std::array<Lanes, 3> a, ab, ac;
     Lanes inverse_ab, inverse_ac, inverse_bc;  ///< 1 / squared length; 0 if the length is 0
     Lanes inverse_area;                        ///< 1 / |ab x ac|^2; 0 for slivers: only edges count
-    std::array<Index, kWidth> triangle;
+    std::array<Index, kTreeWidth> triangle;
   };
   struct Range {
     Index begin, end;  ///< places in order_
   };
-  /// Up to kWidth parts of a range, none empty, by repeated halving.
+  /// Up to kTreeWidth parts of a range, none empty, by repeated halving.
   struct Parts {
-    std::array<Range, kWidth> ranges;
+    std::array<Range, kTreeWidth> ranges;
     int count = 1;
   };
   struct Item {

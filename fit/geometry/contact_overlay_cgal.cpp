@@ -54,7 +54,7 @@ EdgeVertices::EdgeVertices(std::span<const Index> vertices, std::span<const Vec3
 
 std::vector<Index> EdgeVertices::on_edge(Index a, Index b, std::span<const Vec3> positions,
                                          ContactBudget& budget) const {
-  constexpr double kLeast = 1e-9, kRounding = 1e-6;
+  constexpr double kLeastEndShare = 1e-9, kOverlayDistanceRounding = 1e-6;
   const Vec3 &from = positions[a], &to = positions[b], along = to - from;
   const double length = along.norm();
   // The candidates are between two planes on both sides of the edge, perpendicular to the axis along which there are
@@ -74,8 +74,8 @@ std::vector<Index> EdgeVertices::on_edge(Index a, Index b, std::span<const Vec3>
     const Vec3 offset = positions[v] - from;
     const double share = offset.dot(along) / along.squaredNorm();
     const double beside = (offset - share * along).norm();
-    if (std::min(share, 1 - share) * length > std::max(kLeast * length, beside) &&
-        beside <= distance_ * (1 + kRounding))
+    if (std::min(share, 1 - share) * length > std::max(kLeastEndShare * length, beside) &&
+        beside <= distance_ * (1 + kOverlayDistanceRounding))
       found.push_back({share, v});
   }
   std::ranges::sort(found);
@@ -98,7 +98,7 @@ class ContactOverlay::Cluster {
 
   /// Finds the plane. Returns false if some triangles do not lie in it.
   bool find_plane() {
-    constexpr double kLeastCosine = 0.99;  // of the angle between normals
+    constexpr double kLeastPlanarCosine = 0.99;  // of the angle between normals
     const auto area_vector = [&](Index t) { return doubled_area_vector(mesh_, mesh_.triangles[t]); };
     const Index largest =
         *std::ranges::max_element(triangles_, {}, [&](Index t) { return area_vector(t).squaredNorm(); });
@@ -108,7 +108,7 @@ class ContactOverlay::Cluster {
     x_ = (axis_ + 1) % 3;
     y_ = (axis_ + 2) % 3;
     return std::ranges::all_of(triangles_, [&](Index t) {
-      return std::abs(area_vector(t).dot(normal_)) >= kLeastCosine * area_vector(t).norm();
+      return std::abs(area_vector(t).dot(normal_)) >= kLeastPlanarCosine * area_vector(t).norm();
     });
   }
 
@@ -241,11 +241,11 @@ class ContactOverlay::Cluster {
 
   /// Returns the pairs of places of boxes that meet, the lower one first, ascending.
   std::vector<std::array<Index, 2>> near_pairs(std::span<const Eigen::AlignedBox3d> boxes) const {
-    constexpr std::size_t kMostPairs = 30'000'000;  // 240 MB
+    constexpr std::size_t kMostBoxPairs = 30'000'000;  // 240 MB
     std::vector<std::array<Index, 2>> pairs;
     for_each_box_pair(boxes, [&](Index a, Index b) {
       overlay_.budget_.spend(1);
-      if (pairs.size() == kMostPairs) throw ContactBudget::Spent();
+      if (pairs.size() == kMostBoxPairs) throw ContactBudget::Spent();
       pairs.push_back({std::min(a, b), std::max(a, b)});
     });
     std::ranges::sort(pairs);

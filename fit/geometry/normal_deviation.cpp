@@ -20,20 +20,20 @@ using namespace internal;
 namespace {
 
 constexpr double kBinsPerDegree = 2;  // angles from 0 to 90 degrees
-constexpr std::size_t kBins = 180;
+constexpr std::size_t kAngleBins = 180;
 
 /// Areas by angle.
 struct Angles {
-  std::array<double, kBins> area{};
+  std::array<double, kAngleBins> area{};
   double total = 0, integral = 0;
 
   void add(double degrees, double share) {
-    area[std::min(kBins - 1, static_cast<std::size_t>(kBinsPerDegree * degrees))] += share;
+    area[std::min(kAngleBins - 1, static_cast<std::size_t>(kBinsPerDegree * degrees))] += share;
     total += share;
     integral += share * degrees;
   }
   void add(const Angles& other) {
-    for (std::size_t i = 0; i < kBins; ++i) area[i] += other.area[i];
+    for (std::size_t i = 0; i < kAngleBins; ++i) area[i] += other.area[i];
     total += other.total;
     integral += other.integral;
   }
@@ -50,12 +50,13 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const ClosestPoint&
   double total = 0;
   for (std::size_t t = 0; t < fitted.triangles.size(); ++t)
     total += doubled_area_vector(fitted, fitted.triangles[t]).norm();
-  constexpr std::size_t kRun = 32;   // sums and hints stay within a run, whatever thread takes it
-  std::vector<Angles> runs((fitted.triangles.size() + kRun - 1) / kRun);
+  constexpr std::size_t kTrianglesPerRun = 32;  // sums and hints stay within a run, whatever thread takes it
+  std::vector<Angles> runs((fitted.triangles.size() + kTrianglesPerRun - 1) / kTrianglesPerRun);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < runs.size(); ++run) {
     Index hint = kNoIndex;
-    for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, fitted.triangles.size()); ++place) {
+    for (std::size_t place = run * kTrianglesPerRun;
+         place < std::min((run + 1) * kTrianglesPerRun, fitted.triangles.size()); ++place) {
       const auto t = static_cast<std::size_t>(fitted_tree.order()[place]);  // neighbors in space
       const Vec3 vector = doubled_area_vector(fitted, fitted.triangles[t]);
       const double share = total > 0 ? vector.norm() / total : 0;
@@ -81,8 +82,8 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const ClosestPoint&
   if (!(all.total > 0)) return {};
   double below = 0;
   std::size_t bin = 0;
-  while (bin < kBins && (below += all.area[bin]) < 0.95 * all.total) ++bin;
-  return {all.integral / all.total, static_cast<double>(std::min(bin + 1, kBins)) / kBinsPerDegree};
+  while (bin < kAngleBins && (below += all.area[bin]) < 0.95 * all.total) ++bin;
+  return {all.integral / all.total, static_cast<double>(std::min(bin + 1, kAngleBins)) / kBinsPerDegree};
 }
 
 }  // namespace subvol

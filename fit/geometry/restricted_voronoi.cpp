@@ -16,7 +16,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kChunk = 256;  // triangles whose sums are made together; the same for any number of threads
+/// Triangles whose sums are made together, and positions that are located so: the same for any number of threads.
+constexpr std::size_t kVoronoiChunkSize = 256;
 constexpr double kMaxLooseness = 2;  // of the tree's boxes; beyond it, the tree is built anew
 
 Vec3 box_center(std::span<const Vec3> points) {
@@ -34,11 +35,12 @@ void locate(std::span<const Vec3> positions, const Vec3& center, const SiteTree&
             std::vector<Index>& nearest) {
   moved.resize(positions.size());
   nearest.resize(positions.size());
-  const std::size_t num_chunks = (positions.size() + kChunk - 1) / kChunk;
+  const std::size_t num_chunks = (positions.size() + kVoronoiChunkSize - 1) / kVoronoiChunkSize;
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
     Index before = kNoIndex;
-    for (std::size_t i = chunk * kChunk; i < std::min(positions.size(), (chunk + 1) * kChunk); ++i) {
+    for (std::size_t i = chunk * kVoronoiChunkSize; i < std::min(positions.size(), (chunk + 1) * kVoronoiChunkSize);
+         ++i) {
       moved[i] = positions[i] - center;
       before = before == kNoIndex ? tree.nearest(moved[i]).place
                                   : tree.nearest(moved[i], (tree.position(before) - moved[i]).squaredNorm()).place;
@@ -89,7 +91,7 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
   std::vector<Index> nearest;
   locate(positions, center_, tree_, moved, nearest);
 
-  const std::size_t num_chunks = (triangles.size() + kChunk - 1) / kChunk;
+  const std::size_t num_chunks = (triangles.size() + kVoronoiChunkSize - 1) / kVoronoiChunkSize;
   struct Segment {
     int thread;
     std::size_t begin, end, target;
@@ -98,7 +100,8 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
   std::vector<std::vector<VoronoiPiece>> found(static_cast<std::size_t>(omp_get_max_threads()));
   const auto cut = [&](std::size_t chunk, int thread, TriangleCutter& cutter, std::vector<VoronoiPiece>& mine) {
     segments[chunk] = {thread, mine.size(), 0, 0};
-    for (std::size_t t = chunk * kChunk; t < std::min(triangles.size(), (chunk + 1) * kChunk); ++t) {
+    for (std::size_t t = chunk * kVoronoiChunkSize; t < std::min(triangles.size(), (chunk + 1) * kVoronoiChunkSize);
+         ++t) {
       const auto& v = triangles[t];
       cutter.cut(static_cast<Index>(t), {moved[v[0]], moved[v[1]], moved[v[2]]},
                  {nearest[v[0]], nearest[v[1]], nearest[v[2]]}, mine);

@@ -14,7 +14,7 @@ constexpr std::size_t kBranch = kWide;
 constexpr int kMaxLevels = 12;      // 8^12 boxes
 constexpr double kFarAway = 1e200;  // coordinate in unused lanes; its square is infinite
 // By rounding, a box may be farther than a site in it: the slack keeps the result independent of the bound.
-constexpr double kSlack = 1 + 1e-14;
+constexpr double kSquaredDistanceSlack = 1 + 1e-14;
 
 int longest_axis(std::span<const Vec3> sites, std::span<const Index> order) {
   Vec3 low = sites[order[0]], high = low;
@@ -134,7 +134,7 @@ SiteTree::Nearest SiteTree::nearest(const Vec3& point, double bound) const {
   Nearest best;
   if (sites_.empty()) return best;
   // Unused lanes are infinitely far away: no limit admits them.
-  double limit = std::min(bound * kSlack, std::numeric_limits<double>::max());
+  double limit = std::min(bound * kSquaredDistanceSlack, std::numeric_limits<double>::max());
   struct Entry {
     double distance;
     std::uint32_t number;
@@ -155,7 +155,7 @@ SiteTree::Nearest SiteTree::nearest(const Vec3& point, double bound) const {
         if (d[k] < best.squared_distance || (d[k] == best.squared_distance && sites_[place] < sites_[best.place]))
           best = {place, d[k]};
       }
-      limit = std::min(limit, best.squared_distance * kSlack);
+      limit = std::min(limit, best.squared_distance * kSquaredDistanceSlack);
       continue;
     }
     box_distances(boxes_[level_offsets_[entry.level] + entry.number], point, d);
@@ -191,7 +191,7 @@ bool SiteTree::gather(std::span<const Ball> balls, std::size_t max_count, std::v
         leaf_distances(leaves_[entry.number], ball.center, d);
       else
         box_distances(boxes_[level_offsets_[entry.level] + entry.number], ball.center, d);
-      lanes |= lanes_within(d, leaf ? ball.squared_radius : ball.squared_radius * kSlack);
+      lanes |= lanes_within(d, leaf ? ball.squared_radius : ball.squared_radius * kSquaredDistanceSlack);
     }
     if (leaf) count += static_cast<std::size_t>(std::popcount(lanes));
     if (count > max_count) return false;

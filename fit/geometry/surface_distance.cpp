@@ -49,8 +49,8 @@ struct Samples {
 template <class Keyed>
 int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::span<const Keyed> at_edge,
                    bool all_known, double spacing) {
-  constexpr double kSmoothCosine = 0.985;  // of 10 degrees
-  constexpr double kMost = 1000;           // points of an edge, however long it is
+  constexpr double kSmoothCosine = 0.985;   // of 10 degrees
+  constexpr double kMostEdgePoints = 1000;  // however long the edge is
   if (at_edge.size() == 1 && !all_known) return 1;
   const auto corners = [&](const Keyed& side) { return mesh.triangles[order[side.edge.place]]; };
   const auto normal = [&](const Keyed& side) { return triangle_normal(mesh, order[side.edge.place]); };
@@ -65,7 +65,7 @@ int points_of_edge(const TriangleMesh& mesh, std::span<const Index> order, std::
   const int k = at_edge[0].edge.corner;
   const double length =
       (mesh.positions[corners(at_edge[0])[(k + 1) % 3]] - mesh.positions[corners(at_edge[0])[k]]).norm();
-  return spacing > 0 ? static_cast<int>(std::clamp(std::round(length / spacing) - 1, 1.0, kMost)) | 1 : 1;
+  return spacing > 0 ? static_cast<int>(std::clamp(std::round(length / spacing) - 1, 1.0, kMostEdgePoints)) | 1 : 1;
 }
 
 /// Returns the edges of the triangles that are cut, each once, in ascending order of their places.
@@ -102,10 +102,10 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
 }
 
 Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const SurfaceDistanceOptions& options) {
-  // If there are more than kDense triangles per sample, a triangle of less than kLeastShare of a sample's area is
-  // sampled at its corners only. A fitted surface is farthest at its corners, so a coarse one must not be sampled so.
+  // If there are more than kDense triangles per sample, a triangle of less than kLeastSampledShare of a sample's area
+  // is sampled at its corners only. A fitted surface is farthest at its corners: a coarse one must not be sampled so.
   constexpr std::size_t kDense = 4;
-  constexpr double kLeastShare = 0.125;
+  constexpr double kLeastSampledShare = 0.125;
   Samples samples;
   std::vector<double> areas(order.size());
   for (std::size_t place = 0; place < order.size(); ++place)
@@ -114,7 +114,7 @@ Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const
   std::vector<double> of_vertex(mesh.positions.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
     const double share = samples.area > 0 ? options.num_samples * (areas[place] / samples.area) : 0;
-    const bool is_small = is_dense && share < kLeastShare;
+    const bool is_small = is_dense && share < kLeastSampledShare;
     samples.cuts.push_back(is_small ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(share)))));
     if (is_small)
       for (const Index v : mesh.triangles[order[place]]) of_vertex[v] += areas[place] / 3;
@@ -165,12 +165,12 @@ class Sampler {
 /// it.
 template <class Add>
 void sample(std::size_t n, const ClosestPoint& to, const Add& add, OneSided& result) {
-  constexpr std::size_t kRun = 128;  // samples
-  std::vector<OneSided> runs((n + kRun - 1) / kRun);
+  constexpr std::size_t kSamplesPerRun = 128;
+  std::vector<OneSided> runs((n + kSamplesPerRun - 1) / kSamplesPerRun);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < runs.size(); ++run) {
     Sampler sampler(to);
-    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, n); ++i) add(sampler, i);
+    for (std::size_t i = run * kSamplesPerRun; i < std::min((run + 1) * kSamplesPerRun, n); ++i) add(sampler, i);
     runs[run] = sampler.result;
   }
   for (const OneSided& run : runs) {

@@ -14,14 +14,14 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kSamples = 20'000;  // points of the surface from which balls grow
-constexpr int kMostParts = 6;         // an edge of a triangle is cut into at most so many parts
+constexpr std::size_t kThinnessSamples = 20'000;  // points of the surface from which balls grow
+constexpr int kMostEdgeParts = 6;                 // into which an edge of a triangle is cut
 /// A ball counts as empty if a smaller one is, by this factor. The center of the smaller one is not as far from many
 /// triangles as from the closest, as the center of a round solid is: the search stays short.
 constexpr double kSmaller = 0.75;
-constexpr double kNarrower = 0.99;    // share of the best width below which a place is looked at closely
-constexpr double kMostCosine = -0.5;   // of the angle between the normals of two stretches that face each other
-constexpr double kLeastCosine = 0.866; // of the angle between the normal and the line across: 30 degrees
+constexpr double kNarrower = 0.99;            // share of the best width below which a place is looked at closely
+constexpr double kMostCosine = -0.5;          // of the angle between the normals of two stretches that face each other
+constexpr double kLeastAcrossCosine = 0.866;  // of the angle between the normal and the line across: 30 degrees
 
 /// A point of a triangle.
 struct Sample {
@@ -33,9 +33,9 @@ struct Sample {
 std::vector<Sample> samples_of(const TriangleMesh& mesh) {
   const std::size_t n = mesh.triangles.size();
   if (n == 0) return {};
-  const std::size_t wanted = std::min(n, kSamples);
-  const int parts = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(kSamples) / static_cast<double>(n))), 1,
-                               kMostParts);
+  const std::size_t wanted = std::min(n, kThinnessSamples);
+  const int parts = std::clamp(
+      static_cast<int>(std::sqrt(static_cast<double>(kThinnessSamples) / static_cast<double>(n))), 1, kMostEdgeParts);
   std::vector<Sample> samples;
   for (std::size_t i = 0; i < wanted; ++i) {
     const auto t = static_cast<Index>(i * n / wanted);
@@ -76,9 +76,9 @@ class Balls {
  private:
   /// Shrinks a ball until the surface is outside of `kSmaller` times it. Returns false if it never touches the surface.
   bool shrink(const Sample& sample, const Vec3& inward, double radius, ThinPlace& found) const {
-    constexpr int kSteps = 40;         // of kSmaller each: 1e-5 of the first radius
-    constexpr double kTouches = 1e-7;  // share of the radius
-    for (int step = 0; step < kSteps; ++step) {
+    constexpr int kMostShrinkingSteps = 40;  // of kSmaller each: 1e-5 of the first radius
+    constexpr double kTouches = 1e-7;        // share of the radius
+    for (int step = 0; step < kMostShrinkingSteps; ++step) {
       const double smaller = kSmaller * radius;
       const ClosestPoint::Hit hit = tree_.closest(sample.point + smaller * inward, sample.triangle);
       if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouches) * smaller) break;
@@ -95,7 +95,7 @@ class Balls {
       for (Index w : mesh_.triangles[place.triangles[1]])
         if (v == w) return false;
     const double opposite = triangle_normal(mesh_, place.triangles[0]).dot(triangle_normal(mesh_, place.triangles[1]));
-    return opposite <= kMostCosine && inward.dot(place.across - place.at) >= kLeastCosine * place.width;
+    return opposite <= kMostCosine && inward.dot(place.across - place.at) >= kLeastAcrossCosine * place.width;
   }
 
   const TriangleMesh& mesh_;

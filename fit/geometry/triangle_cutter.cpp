@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<double, 6> kWholeTriangle = {1. / 6, 1. / 12, 1. / 12, 1. / 6, 1. / 12, 1. / 6};
 // Six products and sums with relative errors of 1.1e-16 each, and as much again for interpolated corners.
-constexpr double kRounding = 4e-15;
+constexpr double kSquaredDifferenceRounding = 4e-15;
 
 // Largest number of sites for which the cells of a part are found at once, and of failures of that in a row, after
 // which it is no longer tried.
@@ -37,8 +37,8 @@ void TriangleCutter::cut(Index triangle, const std::array<Vec3, 3>& positions, c
   positions_ = positions;
   parts_.assign(1, 0);
   corners_.clear();
-  constexpr Barycentric kCorners[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int k = 0; k < 3; ++k) corners_.push_back({kCorners[k], slot_of(nearest[k])});
+  constexpr Barycentric kCornerBarycentrics[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int k = 0; k < 3; ++k) corners_.push_back({kCornerBarycentrics[k], slot_of(nearest[k])});
   num_failures_ = 0;
   while (!parts_.empty()) {
     int c, b;
@@ -63,7 +63,7 @@ int TriangleCutter::slot_of(Index place) {
       s.value[k] = difference.dot(sum);
       reach = std::max(reach, (a - positions_[k]).squaredNorm() + (r - positions_[k]).squaredNorm());
     }
-    s.noise = kRounding * std::sqrt(difference.squaredNorm() * 2 * reach);
+    s.noise = kSquaredDifferenceRounding * std::sqrt(difference.squaredNorm() * 2 * reach);
   }
   slots_.push_back(s);
   return slot;
@@ -219,7 +219,7 @@ double TriangleCutter::add_candidates() {
       for (Wide& value : values) value[lane] = CellEnvelope::kNever;
     envelope_.add(values, ranks);
   }
-  return kRounding * std::sqrt(2 * highest_lane(worst));
+  return kSquaredDifferenceRounding * std::sqrt(2 * highest_lane(worst));
 }
 
 bool TriangleCutter::part_at_once() {

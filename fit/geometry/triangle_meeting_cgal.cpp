@@ -51,10 +51,10 @@ bool separated_by_edge(const Corners& a, const Corners& b) {
 
 /// True if the point of a triangle's plane that is closest to p lies in the triangle, up to rounding.
 bool is_over(const Corners& t, const Vec3& p) {
-  constexpr double kSlack = -1e-9;  // share of the triangle's height
+  constexpr double kOverTriangleSlack = -1e-9;  // share of the triangle's height
   const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
   for (std::size_t e = 0; e < 3; ++e)
-    if (normal.dot((t[(e + 1) % 3] - t[e]).cross(p - t[e])) < kSlack * normal.squaredNorm()) return false;
+    if (normal.dot((t[(e + 1) % 3] - t[e]).cross(p - t[e])) < kOverTriangleSlack * normal.squaredNorm()) return false;
   return true;
 }
 

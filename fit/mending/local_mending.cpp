@@ -21,9 +21,9 @@ namespace {
 
 /// Pairs of a changed triangle and one near it at one fault, and at all of them, after which the search for changes
 /// ends. A million of them take about 20 ms; a fault among triangles of the usual shape takes a sixth of that.
-constexpr std::size_t kMostWorkAtFault = 10'000'000, kMostWork = 500'000'000;
-constexpr std::size_t kBoxesPerPair = 100;  ///< boxes that are compared in the time of one pair
-constexpr std::size_t kRun = 64;            ///< triangles in succession along x with one box
+constexpr std::size_t kMostWorkAtFault = 10'000'000, kMostMendingWork = 500'000'000;
+constexpr std::size_t kBoxesPerPair = 100;    ///< boxes that are compared in the time of one pair
+constexpr std::size_t kTrianglesPerBox = 64;  ///< in succession along x
 
 /// Mends one surface.
 class LocalMender {
@@ -39,10 +39,10 @@ class LocalMender {
     const auto x = [&](Index t) { return mesh.positions[mesh.triangles[t][0]].x(); };
     std::ranges::stable_sort(along_x_, {}, x);
     run_of_.resize(along_x_.size());
-    run_boxes_.resize((along_x_.size() + kRun - 1) / kRun);
+    run_boxes_.resize((along_x_.size() + kTrianglesPerBox - 1) / kTrianglesPerBox);
     for (std::size_t i = 0; i < along_x_.size(); ++i) {
-      run_of_[along_x_[i]] = i / kRun;
-      run_boxes_[i / kRun].extend(box_of(along_x_[i]));
+      run_of_[along_x_[i]] = i / kTrianglesPerBox;
+      run_boxes_[i / kTrianglesPerBox].extend(box_of(along_x_[i]));
     }
   }
   LocalMending run();
@@ -137,7 +137,7 @@ MendingPatch LocalMender::patch_around(const std::vector<Index>& seeds, std::vec
   }
   for (std::size_t run = 0; run < run_boxes_.size(); ++run) {
     if (!patch.box.intersects(run_boxes_[run])) continue;
-    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, along_x_.size()); ++i) {
+    for (std::size_t i = run * kTrianglesPerBox; i < std::min((run + 1) * kTrianglesPerBox, along_x_.size()); ++i) {
       const Index t = along_x_[i];
       if (done_.is_dropped[t]) continue;
       const Eigen::AlignedBox3d box = box_of(t);
@@ -238,7 +238,7 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
   std::size_t work = 0;  // at this fault
   const auto try_all = [&](const PatchFaults& known, const std::vector<MendingChange>& first) {
     for (const MendingChange& change : possible_changes(patch, seed_vertices, given, distance_)) {
-      if (is_cancelled() || work > kMostWorkAtFault || work_ > kMostWork) return;
+      if (is_cancelled() || work > kMostWorkAtFault || work_ > kMostMendingWork) return;
       PatchUndo replaced;
       if (!patch.apply(change, replaced)) continue;
       std::vector<MendingChange> all = first;
@@ -285,10 +285,10 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
 }
 
 LocalMending LocalMender::run() {
-  constexpr int kMostRounds = 30;  // a round mends faults that do not touch one another
+  constexpr int kMostMendingRounds = 30;  // a round mends faults that do not touch one another
   // Number of faults above which nothing is mended: patches are meant for few.
   constexpr std::size_t kMostFaults = 1000;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostMendingRounds; ++round) {
     const std::vector<std::vector<Index>> seeds = faults();
     if (is_cancelled() || seeds.empty() || seeds.size() > kMostFaults) break;
     is_touched_.assign(mesh_.triangles.size(), 0);
@@ -332,7 +332,7 @@ bool is_manifold(std::span<const std::array<Index, 3>> triangles, std::size_t nu
 void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, double distance) {
   // Largest move, as a share of the shortest edge at the vertex, and the length of the mean direction below which a fan
   // leans to no side.
-  constexpr double kShareOfEdge = 0.1, kLeastLean = 0.05;
+  constexpr double kMostMoveShare = 0.1, kLeastLean = 0.05;
   const std::set<Index> wanted(vertices.begin(), vertices.end());
   std::map<Index, std::set<Index>> neighbors;
   for (const auto& t : mesh.triangles)
@@ -342,14 +342,14 @@ void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, doubl
   for (auto& [v, around] : neighbors) {
     around.erase(v);
     Vec3 lean = Vec3::Zero();
-    double shortest = 2 * distance / kShareOfEdge;
+    double shortest = 2 * distance / kMostMoveShare;
     for (const Index w : around) {
       const Vec3 edge = mesh.positions[w] - mesh.positions[v];
       shortest = std::min(shortest, edge.norm());
       lean += edge.stableNormalized() / static_cast<double>(around.size());
     }
     if (lean.norm() < kLeastLean) continue;
-    moved.emplace_back(v, mesh.positions[v] + std::min(distance / 2, kShareOfEdge * shortest) * lean.normalized());
+    moved.emplace_back(v, mesh.positions[v] + std::min(distance / 2, kMostMoveShare * shortest) * lean.normalized());
   }
   for (const auto& [v, position] : moved) mesh.positions[v] = position;
 }

@@ -25,7 +25,7 @@ using namespace internal;
 namespace {
 
 /// Distance below which vertices are one, as a share of the diagonal: the rounding of numbers in single precision.
-constexpr double kRounding = 1e-7;
+constexpr double kSameVertexShare = 1e-7;
 
 bool has_only_triangles(const PolygonMesh& surface) {
   for (std::size_t f = 0; f < surface.num_faces(); ++f)
@@ -108,7 +108,7 @@ void Mender::drop(const std::vector<char>& is_dropped) {
 void Mender::merge_vertices() {
   std::vector<Index> all(mesh_.positions.size());
   std::iota(all.begin(), all.end(), 0);
-  merge(near_vertices(mesh_.positions, all, std::min(distance_, kRounding * diagonal_)));
+  merge(near_vertices(mesh_.positions, all, std::min(distance_, kSameVertexShare * diagonal_)));
 }
 
 /// Merges vertices on both sides of cracks.

@@ -119,7 +119,7 @@ class CrackSets {
 };
 
 bool CrackSets::find_pairs() {
-  constexpr std::size_t kMostPairs = 10'000'000;  // tests of distances, to bound the time
+  constexpr std::size_t kMostCrackPairs = 10'000'000;  // tests of distances, to bound the time
   std::vector<Index> vertices;
   for (const auto& edge : rims_) vertices.insert(vertices.end(), edge.begin(), edge.end());
   sort_unique(vertices);
@@ -140,7 +140,7 @@ bool CrackSets::find_pairs() {
     cost += kWayCost * close.size();
     for (const NearPair& pair : near)
       if (!std::binary_search(close.begin(), close.end(), pair.low)) pairs_.push_back(pair);
-    if (cost > kMostComparisons || pairs_.size() > kMostPairs) return false;
+    if (cost > kMostComparisons || pairs_.size() > kMostCrackPairs) return false;
   }
   return true;
 }

@@ -29,7 +29,7 @@ SortedTriangle sorted(std::array<Index, 3> corners, Index triangle) {
 }  // namespace
 
 std::optional<OneSidedSurface> without_second_sides(const TriangleMesh& surface) {
-  constexpr double kNearlyAll = 0.9;  // share of the triangles
+  constexpr double kLeastTwoSidedShare = 0.9;  // of the triangles
   const TriangleMesh mesh = welded(surface).mesh;
   std::vector<SortedTriangle> all;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -44,7 +44,8 @@ std::optional<OneSidedSurface> without_second_sides(const TriangleMesh& surface)
     is_second[all[++first].triangle] = 1;
     ++dropped;
   }
-  if (2 * static_cast<double>(dropped) < kNearlyAll * static_cast<double>(mesh.triangles.size()) || dropped == 0)
+  if (2 * static_cast<double>(dropped) < kLeastTwoSidedShare * static_cast<double>(mesh.triangles.size()) ||
+      dropped == 0)
     return std::nullopt;
   OneSidedSurface result{.dropped = dropped};
   result.surface.positions = mesh.positions;

@@ -182,7 +182,7 @@ std::size_t cut_at_junctions(TriangleMesh& surface, double tolerance) {
 }  // namespace
 
 std::optional<TidySurface> tidy_surface(const TriangleMesh& surface, const SurfaceDiagnosis& diagnosis) {
-  constexpr double kOnEdge = 1e-6;  // share of the diagonal; coordinates in single precision are as exact
+  constexpr double kOpenEdgeTolerance = 1e-6;  // share of the diagonal; coordinates in single precision are as exact
   const bool repeats = diagnosis.find(SurfaceFault::repeated_triangle) != nullptr;
   const bool disagrees = diagnosis.find(SurfaceFault::disagreement) && !diagnosis.find(SurfaceFault::interface);
   const bool is_open = diagnosis.find(SurfaceFault::open_rim) || diagnosis.find(SurfaceFault::pinhole);
@@ -194,7 +194,7 @@ std::optional<TidySurface> tidy_surface(const TriangleMesh& surface, const Surfa
   if (repeats)
     note(drop_repeated(tidy.surface), "triangle repeats another one: dropped", "triangles repeat others: dropped");
   if (is_open)
-    note(cut_at_junctions(tidy.surface, kOnEdge * diagnosis.diagonal),
+    note(cut_at_junctions(tidy.surface, kOpenEdgeTolerance * diagnosis.diagonal),
          "vertex lies on the open edge of a triangle, which is cut there",
          "vertices lie on open edges of triangles, which are cut there");
   if (disagrees)

@@ -11,8 +11,8 @@
 namespace subvol::internal {
 namespace {
 
-constexpr double kLeastVisibility = 1e-6;  // least cosine to all normals; below it, rounding decides
-constexpr std::size_t kFew = 64;  // number of normals up to which their cap is found directly, in any order
+constexpr double kLeastVisibleCosine = 1e-6;  // to all normals; below it, rounding decides
+constexpr std::size_t kFew = 64;              // number of normals up to which their cap is found directly, in any order
 
 /// A cap of the unit sphere: all points p with axis . p >= cosine.
 struct Cap {
@@ -33,7 +33,7 @@ Cap cap_of(const Vec3& p, const Vec3& q, const Vec3& r) {
 }
 
 bool sees(const Vec3& direction, std::span<const Vec3> normals) {
-  return std::ranges::all_of(normals, [&](const Vec3& normal) { return direction.dot(normal) > kLeastVisibility; });
+  return std::ranges::all_of(normals, [&](const Vec3& normal) { return direction.dot(normal) > kLeastVisibleCosine; });
 }
 
 /// Finds the smallest cap as Welzl finds the smallest circle: a point outside lies on the border of the next larger

@@ -44,7 +44,7 @@ struct Samples {
 };
 
 Samples samples_of(const CurvedBoundary& boundary) {
-  constexpr double kNear = 2.0 / 3, kFar = 1.0 / 6;  // weights of the corners at the centers of the three outer parts
+  constexpr double kNearCornerWeight = 2.0 / 3, kFarCornerWeight = 1.0 / 6;  // at the centers of the three outer parts
   Samples samples;
   const TriangleMesh& mesh = boundary.triangles;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -52,7 +52,8 @@ Samples samples_of(const CurvedBoundary& boundary) {
     const Vec3 vector = doubled_area_vector(mesh, mesh.triangles[t]);
     const Vec3 sum = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
     samples.points.push_back(sum / 3);
-    for (const Index v : mesh.triangles[t]) samples.points.push_back(kFar * sum + (kNear - kFar) * mesh.positions[v]);
+    for (const Index v : mesh.triangles[t])
+      samples.points.push_back(kFarCornerWeight * sum + (kNearCornerWeight - kFarCornerWeight) * mesh.positions[v]);
     samples.normals.insert(samples.normals.end(), 4, vector.stableNormalized());
     samples.areas.insert(samples.areas.end(), 4, vector.norm() / 8);
     samples.faces.insert(samples.faces.end(), 4, boundary.faces[t]);

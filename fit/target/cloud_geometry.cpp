@@ -16,9 +16,9 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kNeighbors = 16;  // of a point, for its normal and its area (docs/fitting.md)
-constexpr double kLeastShare = 1e-20;   // floor of a squared radius, as a share of diagonal^2 (k + 1) / n
-constexpr double kSlack = 1 + 1e-14;    // the tree sums squared distances in another order
+constexpr std::size_t kNeighbors = 16;               // of a point, for its normal and its area (docs/fitting.md)
+constexpr double kLeastSquaredRadiusShare = 1e-20;   // of diagonal^2 (k + 1) / n, floor of the radius of a search
+constexpr double kSquaredDistanceSlack = 1 + 1e-14;  // the tree sums squared distances in another order
 
 /// A point of the tree with its distance from the query point.
 struct Neighbor {
@@ -47,7 +47,7 @@ class NeighborSearch {
         if (other != place) found_.push_back({(tree_.position(other) - center).squaredNorm(), other});
       std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
       found_.resize(k_);
-      if (found_.back().squared_distance * kSlack <= squared_radius) break;
+      if (found_.back().squared_distance * kSquaredDistanceSlack <= squared_radius) break;
     }
     squared_radius = std::max({2 * found_.back().squared_distance, 1e-12 * squared_radius, least_});
     return found_;
@@ -94,17 +94,18 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
   CloudGeometry result;
   result.normals.resize(n);
   result.areas.resize(n);
-  constexpr std::size_t kRun = 256;  // radii are passed on within a run, whatever thread takes it
-  const double least = kLeastShare * (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
+  constexpr std::size_t kCloudPointsPerRun = 256;  // radii are passed on within a run, whatever thread takes it
+  const double least =
+      kLeastSquaredRadiusShare * (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t run = 0; run < (n + kRun - 1) / kRun; ++run) {
+  for (std::size_t run = 0; run < (n + kCloudPointsPerRun - 1) / kCloudPointsPerRun; ++run) {
     NeighborSearch neighbors(tree, k, least);
     // Points next to each other in the tree are close in space. The bounding box gives no good guess: one point far
     // away would put the whole cloud within reach.
-    const std::size_t first = run * kRun, beside = first + 1 < n ? first + 1 : first - 1;
+    const std::size_t first = run * kCloudPointsPerRun, beside = first + 1 < n ? first + 1 : first - 1;
     double squared_radius = std::max(
         least, (tree.position(static_cast<Index>(beside)) - tree.position(static_cast<Index>(first))).squaredNorm());
-    for (std::size_t i = first; i < std::min(n, first + kRun); ++i) {
+    for (std::size_t i = first; i < std::min(n, first + kCloudPointsPerRun); ++i) {
       const auto place = static_cast<Index>(i);
       const std::vector<Neighbor>& found = neighbors(place, squared_radius);
       const auto point = static_cast<std::size_t>(tree.site(place));

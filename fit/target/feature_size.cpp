@@ -14,11 +14,11 @@ namespace {
 
 /// Returns the radius of the ball at p on the side of n; `most` if it touches nothing that is about opposite to p.
 double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, double most) {
-  constexpr double kOpposite = -0.866;  // cosine of 150 degrees
-  constexpr double kTouching = 0.98;    // a ball is empty if the surface is farther than this share of its radius
-  constexpr int kMostRounds = 30;       // the radius falls in each, and rounding must not keep it falling
+  constexpr double kOpposite = -0.866;     // cosine of 150 degrees
+  constexpr double kTouching = 0.98;       // a ball is empty if the surface is farther than this share of its radius
+  constexpr int kMostBallShrinkings = 30;  // the radius falls in each, and rounding must not keep it falling
   double radius = most, cosine = 1;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostBallShrinkings; ++round) {
     const Vec3 center = p + radius * n;
     const ClosestPoint::Hit hit = tree.closest_within(center, kTouching * radius);
     if (hit.triangle == kNoIndex) break;
@@ -35,17 +35,17 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
 
 FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most,
                            const std::function<bool()>& cancelled) {
-  constexpr std::size_t kBetweenQuestions = 4096;  // samples between two questions whether to stop
+  constexpr std::size_t kSamplesPerCancelCheck = 4096;
   if (!(least >= 0) || !(most > least) || !std::isfinite(most))
     throw InputError("feature sizes: the largest radius must be finite and above the smallest, which must be >= 0");
   FeatureSizes features;
   if (surface.is_cloud()) return features;
   const std::vector<Vec3>&samples = surface.samples(), &normals = surface.sample_normals();
   std::vector<double> sizes(samples.size(), most);
-  for (std::size_t first = 0; first < samples.size(); first += kBetweenQuestions) {
+  for (std::size_t first = 0; first < samples.size(); first += kSamplesPerCancelCheck) {
     if (cancelled && cancelled()) break;
 #pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = first; i < std::min(first + kBetweenQuestions, samples.size()); ++i)
+    for (std::size_t i = first; i < std::min(first + kSamplesPerCancelCheck, samples.size()); ++i)
       sizes[i] =
           std::min(ball_radius(samples[i], normals[i], tree, most), ball_radius(samples[i], -normals[i], tree, most));
   }

@@ -147,11 +147,12 @@ SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
 
 SurfaceDistance FitTarget::interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const {
   // All pairs of regions share so many samples: if there are many pairs, each of them has fewer.
-  constexpr std::size_t kMostSamples = 500'000, kLeastSamples = 500;
+  constexpr std::size_t kMostInterfaceSamples = 500'000, kLeastPairSamples = 500;
   const Index num_groups = groups.empty() ? 0 : *std::ranges::max_element(groups);
   const TrianglesByGroup of_fitted(fitted, groups), of_target(interfaces, group_of_interface_triangle);
   SurfaceDistanceOptions options;
-  const std::size_t of_pair = std::max(kLeastSamples, kMostSamples / static_cast<std::size_t>(std::max(num_groups, 1)));
+  const std::size_t of_pair =
+      std::max(kLeastPairSamples, kMostInterfaceSamples / static_cast<std::size_t>(std::max(num_groups, 1)));
   options.num_samples = std::min(options.num_samples, static_cast<int>(of_pair));
   SurfaceDistance largest;
   for (Index group = 1; group <= num_groups; ++group) {

@@ -33,16 +33,16 @@ std::vector<Vec3> Normalization::to_unit(std::vector<Vec3> points) const {
 
 void Normalization::take_in(VolumeMesh& mesh) const {
   // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of cells.
-  constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
+  constexpr double kLeastRelativeSize = 1e-6, kMostRelativeSize = 1e6;
   mesh.positions = to_unit(std::move(mesh.positions));
   Eigen::AlignedBox3d box;
   for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
   if (box.isEmpty()) return;
   const double size = box.diagonal().stableNorm();
-  if (!(size >= kLeastSize && size <= kMostSize))
+  if (!(size >= kLeastRelativeSize && size <= kMostRelativeSize))
     throw InputError(formatted("the mesh is %.2g times as large as the target; expected one roughly in place", size));
   const double distance = box.center().stableNorm();
-  if (!(distance <= kMostSize))
+  if (!(distance <= kMostRelativeSize))
     throw InputError(formatted(
         "the mesh is %.2g times the target's diagonal away from it; expected one roughly in place", distance));
 }

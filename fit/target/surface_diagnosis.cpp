@@ -271,12 +271,11 @@ void Diagnostician::find_thin_places() {
 SurfaceDiagnosis Diagnostician::run() {
   measure();
   using Step = void (Diagnostician::*)();
-  constexpr Step kSteps[] = {&Diagnostician::find_repeated,        &Diagnostician::find_edge_faults,
-                             &Diagnostician::find_rims,            &Diagnostician::find_vertex_contacts,
-                             &Diagnostician::find_nesting,         &Diagnostician::find_meetings,
-                             &Diagnostician::turn_outward,         &Diagnostician::find_sharp_angles,
-                             &Diagnostician::find_thin_places};
-  for (const Step step : kSteps)
+  constexpr Step kDiagnosisSteps[] = {
+      &Diagnostician::find_repeated,        &Diagnostician::find_edge_faults,  &Diagnostician::find_rims,
+      &Diagnostician::find_vertex_contacts, &Diagnostician::find_nesting,      &Diagnostician::find_meetings,
+      &Diagnostician::turn_outward,         &Diagnostician::find_sharp_angles, &Diagnostician::find_thin_places};
+  for (const Step step : kDiagnosisSteps)
     if (goes_on()) (this->*step)();
   for (SurfaceFinding& finding : findings_)
     if (finding.count > 0 || !finding.is_complete) result_.findings.push_back(std::move(finding));

@@ -22,7 +22,7 @@ struct Words {
 };
 
 /// In the order of SurfaceFault.
-constexpr Words kWords[kNumSurfaceFaults] = {
+constexpr Words kFaultWords[kNumSurfaceFaults] = {
     {"crossing", "pair of triangles crosses", "pairs of triangles cross", true},
     {"face_contact", "pair of triangles overlaps in one plane", "pairs of triangles overlap in one plane", true},
     {"edge_contact", "edge at which the surface touches itself", "edges at which the surface touches itself", false},
@@ -45,7 +45,7 @@ constexpr Words kWords[kNumSurfaceFaults] = {
     {"thin_gap", "thinnest gap", "thinnest gaps", false},
     {"sharp_angle", "edge sharper than 30 degrees", "edges sharper than 30 degrees", false}};
 
-const Words& words_of(SurfaceFault fault) { return kWords[static_cast<std::size_t>(fault)]; }
+const Words& words_of(SurfaceFault fault) { return kFaultWords[static_cast<std::size_t>(fault)]; }
 
 std::string triangles_text(const SurfacePlace& place) {
   if (place.triangles[0] == kNoIndex) return "";

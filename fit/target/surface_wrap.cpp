@@ -28,8 +28,8 @@ using namespace internal;
 
 namespace {
 
-/// Winding number from which on a point is inside.
-constexpr double kInside = 0.5;
+/// Halfway between outside, 0, and inside, 1.
+constexpr double kInsideWindingNumber = 0.5;
 
 /// Finds the voxels inside a surface.
 class InsideVoxels {
@@ -37,7 +37,7 @@ class InsideVoxels {
   InsideVoxels(const TriangleMesh& surface, const ClosestPoint& tree, double voxel,
                const std::function<bool()>& cancelled)
       : winding_(surface), tree_(tree), voxel_(voxel), cancelled_(cancelled) {
-    constexpr double kMargin = 2;  // empty voxels on each side
+    constexpr double kEmptyMarginVoxels = 2;  // on each side
     Vec3 low = surface.positions[surface.triangles[0][0]], high = low;
     for (const auto& triangle : surface.triangles)
       for (const Index v : triangle) {
@@ -45,8 +45,9 @@ class InsideVoxels {
         high = high.cwiseMax(surface.positions[v]);
       }
     grid_.edges = voxel * Mat3::Identity();
-    grid_.origin = low - Vec3::Constant((kMargin - 0.5) * voxel);
-    for (int a = 0; a < 3; ++a) grid_.counts[a] = static_cast<int>(std::ceil((high - low)[a] / voxel + 2 * kMargin));
+    grid_.origin = low - Vec3::Constant((kEmptyMarginVoxels - 0.5) * voxel);
+    for (int a = 0; a < 3; ++a)
+      grid_.counts[a] = static_cast<int>(std::ceil((high - low)[a] / voxel + 2 * kEmptyMarginVoxels));
     grid_.labels.assign(static_cast<std::size_t>(grid_.counts[0]) * static_cast<std::size_t>(grid_.counts[1]) *
                             static_cast<std::size_t>(grid_.counts[2]),
                         0);
@@ -94,21 +95,21 @@ void InsideVoxels::add_halves(const Place& block, int size, std::vector<Place>& 
 }
 
 bool InsideVoxels::find() {
-  constexpr int kLargest = 8;                   // voxels along the edges of the first blocks
-  constexpr double kClear = 0.25, kAway = 1.2;  // from 1/2; from the surface, in radii of a block
-  constexpr std::size_t kAtOnce = 100'000;      // a fraction of a second
+  constexpr int kFirstBlockSize = 8;              // voxels along the edges of the first blocks
+  constexpr double kClear = 0.25, kAway = 1.2;    // from 1/2; from the surface, in radii of a block
+  constexpr std::size_t kBlocksAtOnce = 100'000;  // a fraction of a second
   std::vector<Place> blocks;
-  for (int k = 0; k < grid_.counts[2]; k += kLargest)
-    for (int j = 0; j < grid_.counts[1]; j += kLargest)
-      for (int i = 0; i < grid_.counts[0]; i += kLargest) blocks.push_back({i, j, k});
+  for (int k = 0; k < grid_.counts[2]; k += kFirstBlockSize)
+    for (int j = 0; j < grid_.counts[1]; j += kFirstBlockSize)
+      for (int i = 0; i < grid_.counts[0]; i += kFirstBlockSize) blocks.push_back({i, j, k});
   std::vector<Vec3> centers;
   std::vector<ClosestPoint::Hit> hits;
-  for (int size = kLargest; !blocks.empty(); size /= 2) {
+  for (int size = kFirstBlockSize; !blocks.empty(); size /= 2) {
     const double radius = 0.5 * size * std::numbers::sqrt3 * voxel_;
     std::vector<Place> parts;
-    for (std::size_t first = 0; first < blocks.size(); first += kAtOnce) {
+    for (std::size_t first = 0; first < blocks.size(); first += kBlocksAtOnce) {
       if (cancelled_ && cancelled_()) return false;
-      const std::size_t end = std::min(first + kAtOnce, blocks.size());
+      const std::size_t end = std::min(first + kBlocksAtOnce, blocks.size());
       centers.clear();
       for (std::size_t b = first; b < end; ++b) centers.push_back(center(blocks[b], size));
       const std::vector<double> winding = winding_.at(centers);
@@ -116,9 +117,10 @@ bool InsideVoxels::find() {
       if (size > 1) tree_.closest(centers, hits);
       for (std::size_t b = first; b < end; ++b) {
         const double number = winding[b - first];
-        const bool is_clear = hits[b - first].distance >= kAway * radius && std::abs(number - kInside) >= kClear;
+        const bool is_clear =
+            hits[b - first].distance >= kAway * radius && std::abs(number - kInsideWindingNumber) >= kClear;
         if (size == 1 || is_clear)
-          label(blocks[b], size, number >= kInside);
+          label(blocks[b], size, number >= kInsideWindingNumber);
         else
           add_halves(blocks[b], size, parts);
       }
@@ -131,7 +133,7 @@ bool InsideVoxels::find() {
 /// Moves vertices to their closest points on a surface where these are within `reach` and face the same way, and where
 /// no triangle folds over or collapses.
 void draw_to(const TriangleMesh& surface, const ClosestPoint& tree, double reach, TriangleMesh& wrap) {
-  constexpr double kSameWay = 0.3, kLeastShare = 0.02;  // cosine of angles; of a triangle's area
+  constexpr double kSameWay = 0.3, kLeastMovedAreaShare = 0.02;  // cosine of angles; of a triangle's area
   std::vector<Vec3> normals(wrap.positions.size(), Vec3::Zero());
   for (const auto& triangle : wrap.triangles)
     for (const Index v : triangle) normals[v] += doubled_area_vector(wrap, triangle);
@@ -147,7 +149,7 @@ void draw_to(const TriangleMesh& surface, const ClosestPoint& tree, double reach
     for (const auto& triangle : wrap.triangles) {
       const Vec3 before = doubled_area_vector(wrap, triangle), after = doubled_area_vector(moved, triangle);
       const double cosine = before.normalized().dot(after.normalized());
-      if (cosine >= kSameWay && after.norm() >= kLeastShare * before.norm()) continue;
+      if (cosine >= kSameWay && after.norm() >= kLeastMovedAreaShare * before.norm()) continue;
       for (const Index v : triangle) {
         is_done = is_done && moved.positions[v] == wrap.positions[v];
         moved.positions[v] = wrap.positions[v];
@@ -161,7 +163,7 @@ void draw_to(const TriangleMesh& surface, const ClosestPoint& tree, double reach
 
 TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& options,
                           const std::function<bool()>& cancelled) {
-  constexpr double kReach = 1.5;  // voxels
+  constexpr double kWrapReachVoxels = 1.5;
   require_in_range("WrapOptions", "voxel_percent", options.voxel_percent, kLeastWrapPercent, kMostWrapPercent);
   const ClosestPoint tree(surface);
   const double voxel = options.voxel_percent / 100 * bounding_box_diagonal(surface);
@@ -172,7 +174,7 @@ TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& option
     throw InputError("surface: it cannot be wrapped: nothing is inside it; do its triangles face outward?");
   TriangleMesh wrap = outer_surface(surface_of_labels(inside.grid(), {.cancelled = cancelled}));
   if (cancelled && cancelled()) return {};
-  draw_to(surface, tree, kReach * voxel, wrap);
+  draw_to(surface, tree, kWrapReachVoxels * voxel, wrap);
   if (!surface.face_groups.groups.empty()) wrap.face_groups = groups_of_pieces(surface, wrap);
   return wrap;
 }
