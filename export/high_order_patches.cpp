@@ -117,8 +117,9 @@ void HighOrderPatches::evaluate(Index patch, std::span<const int> u, std::span<c
   std::size_t i = 0;
   for (const int b : v)
     for (const int a : u) {
-      const Vec3 point = patch_point(face.corners, static_cast<std::size_t>(corner), static_cast<double>(a) / kUnits,
-                                     static_cast<double>(b) / kUnits);
+      const Vec3 point =
+          patch_point(face.corners, static_cast<std::size_t>(corner), static_cast<double>(a) / kPatchSideUnits,
+                      static_cast<double>(b) / kPatchSideUnits);
       const Frame frame = evaluate(face, at, point, normals != nullptr);
       positions[i] = frame.position;
       if (normals) normals[i] = frame.normal;
@@ -127,7 +128,7 @@ void HighOrderPatches::evaluate(Index patch, std::span<const int> u, std::span<c
 }
 
 double HighOrderPatches::bounding_box_diagonal() const {
-  const std::array<int, 5> t{0, kUnits / 4, kUnits / 2, 3 * kUnits / 4, kUnits};
+  const std::array<int, 5> t{0, kPatchSideUnits / 4, kPatchSideUnits / 2, 3 * kPatchSideUnits / 4, kPatchSideUnits};
   std::array<Vec3, 25> points;
   Eigen::AlignedBox3d box;
   for (std::size_t p = 0; p < num_patches(); ++p) {

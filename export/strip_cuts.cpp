@@ -86,12 +86,12 @@ class PatchJudge {
 };
 
 int depth_of(const StripCuts& cuts) {
-  int shortest = PatchSurface::kUnits;
+  int shortest = PatchSurface::kPatchSideUnits;
   for (std::size_t s = 0; s < cuts.num_strips(); ++s) {
     const std::span<const int> t = cuts.cuts(static_cast<Index>(s));
     for (std::size_t i = 0; i + 1 < t.size(); ++i) shortest = std::min(shortest, t[i + 1] - t[i]);
   }
-  return std::countr_zero(static_cast<unsigned>(PatchSurface::kUnits / shortest));
+  return std::countr_zero(static_cast<unsigned>(PatchSurface::kPatchSideUnits / shortest));
 }
 
 /// For every interval of every strip, the largest error that asks for halving it; 0 if none does.
@@ -159,7 +159,7 @@ StripCuts::StripCuts(const PatchSurface& patches) : strips_(patches.num_patches(
       Index& strip = number[edges.of(side(p, k))];
       if (strip == kNoIndex) {
         strip = static_cast<Index>(cuts_.size());
-        cuts_.push_back({0, PatchSurface::kUnits});
+        cuts_.push_back({0, PatchSurface::kPatchSideUnits});
       }
       strips_[p][k] = strip;
     }

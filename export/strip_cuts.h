@@ -15,7 +15,7 @@ namespace subvol::internal {
 /// A strip is a chain of patches joined at opposite sides; all of them are cut across at the same parameters.
 class StripCuts {
  public:
-  /// Without inner cuts: from 0 to PatchSurface::kUnits.
+  /// Without inner cuts: from 0 to PatchSurface::kPatchSideUnits.
   explicit StripCuts(const PatchSurface& patches);
 
   std::size_t num_strips() const { return cuts_.size(); }

@@ -207,7 +207,7 @@ std::size_t ColumnPlanes::num_columns() const {
 void ColumnPlanes::release(Index column) { of_column_[column] = {kNoIndex, kNoIndex}; }
 
 Mat3 ColumnPlanes::projector(std::span<const Index> columns) const {
-  constexpr double kParallel = 1e-6;  // sine of the angle below which two planes are one
+  constexpr double kSameColumnPlaneSine = 1e-6;  // sine of the angle below which two planes are one
   if (planes_.empty() || columns.empty()) return Mat3::Identity();
   std::array<Index, 2> common = of_column_[columns[0]];
   for (const Index column : columns)
@@ -218,7 +218,7 @@ Mat3 ColumnPlanes::projector(std::span<const Index> columns) const {
   const Vec3& n = planes_[common[0]].normal;
   if (common[1] != kNoIndex) {
     const Vec3 line = n.cross(planes_[common[1]].normal);
-    if (line.norm() > kParallel) return line.normalized() * line.normalized().transpose();
+    if (line.norm() > kSameColumnPlaneSine) return line.normalized() * line.normalized().transpose();
   }
   return Mat3::Identity() - n * n.transpose();
 }

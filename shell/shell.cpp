@@ -27,7 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxRounds = 12;  // solves: strands that fail in all of them end at 0.02 of their thickness
+constexpr int kMostShellSolves = 12;  // strands that fail in all of them end at 0.02 of their thickness
 
 void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -253,7 +253,7 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
   std::unique_ptr<SurfaceTerm> surface;
   double lambda = 1;
   if (options_.free_surface) {
-    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;  // relative to 1 along the normal
+    constexpr double kTangentialWeight = 1e-3, kFreeSurfaceLambda = 0.01;  // relative to 1 along the normal
     for (std::size_t v = 0; v < layers_.num_columns(); ++v) {
       sampled.push_back(layers_.vertex(layers_.inside, static_cast<Index>(v)));
       fixed_samples.push_back(fixed[sampled.back()]);
@@ -261,7 +261,7 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
     surface = std::make_unique<ClosestPointEnergy>(*target_, triangulate(layers_.surface).triangles, sampled.size(),
                                                    kTangentialWeight, 3);
     const double share = *std::max_element(thickness_.begin(), thickness_.end()) / target_->length();
-    lambda = kLambda * share * share;
+    lambda = kFreeSurfaceLambda * share * share;
   }
   SparseMap samples = select_rows(nodes, sampled);
   FitProblem problem(std::move(nodes), std::move(samples),
@@ -306,9 +306,9 @@ MinimizerStop ShellMaker::solve(int round) {
 }
 
 void ShellMaker::optimize() {
-  constexpr double kShrink = 0.7;  // of the thickness of strands that still meet another sheet
+  constexpr double kThicknessShrinkFactor = 0.7;  // of the thickness of strands that still meet another sheet
   bool apart = false;
-  for (int round = 0; round < kMaxRounds && !apart && !ended_; ++round) {
+  for (int round = 0; round < kMostShellSolves && !apart && !ended_; ++round) {
     const MinimizerStop stop = solve(round);
     if (stop == MinimizerStop::cancelled) break;
     const ShellFailures failures = check_.failures(positions_, [this] { return is_to_end(); });
@@ -317,8 +317,8 @@ void ShellMaker::optimize() {
       report_.explanation = report_.stages.back().stop;
       report_.stop_reason = stop_reason(stop);
     }
-    if (apart || round + 1 == kMaxRounds) break;  // no solve follows that would use a smaller thickness
-    for (const Index strand : check_.strands(failures)) thickness_[strand] *= kShrink;
+    if (apart || round + 1 == kMostShellSolves) break;  // no solve follows that would use a smaller thickness
+    for (const Index strand : check_.strands(failures)) thickness_[strand] *= kThicknessShrinkFactor;
     limit_slope(layers_, thickness_);
   }
   if (apart) return;
@@ -332,7 +332,7 @@ void ShellMaker::optimize() {
                                " columns were held back: there sheets still met after the last solve");
   if (ended_) return;
   report_.stop_reason = StopReason::iteration_limit;
-  report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";
+  report_.explanation = "sheets still met after " + std::to_string(kMostShellSolves) + " solves and were parted";
 }
 
 void ShellMaker::require_visible_thickness() const {

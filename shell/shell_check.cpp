@@ -22,16 +22,16 @@ std::vector<int> sheets_to_check(const ShellLayers& layers, CheckedSheets which)
 
 /// Lowers the shares around strands that were held back, so that neighbors differ by at most a quarter.
 void grade(const ShellLayers& layers, std::vector<double>& shares) {
-  constexpr double kStep = 0.25;  // of the whole way
+  constexpr double kMostNeighborShareStep = 0.25;  // of the whole way
   const SurfaceTopology& topology = layers.topology;
   const std::size_t num_columns = layers.num_columns();
-  for (int sweep = 0; sweep < static_cast<int>(1 / kStep); ++sweep)
+  for (int sweep = 0; sweep < static_cast<int>(1 / kMostNeighborShareStep); ++sweep)
     for (const Index h : topology.edge_corners) {
       const Index a = topology.corner_vertices[h], b = topology.corner_vertices[topology.next(h)];
       for (const std::size_t side : {std::size_t{0}, num_columns}) {
         double &s = shares[side + a], &t = shares[side + b];
-        s = std::min(s, t + kStep);
-        t = std::min(t, s + kStep);
+        s = std::min(s, t + kMostNeighborShareStep);
+        t = std::min(t, s + kMostNeighborShareStep);
       }
     }
 }
@@ -94,7 +94,8 @@ NodeStrands vertex_strands(const ShellLayers& layers) {
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted, const std::function<bool()>& ended,
                           std::vector<double>* shares_out) {
-  constexpr double kShrink = 0.7, kLeast = 0.05;  // of a share; below kLeast it is 0, so that few shrinkings decide
+  constexpr double kAdvanceShrinkFactor = 0.7;  // of a share
+  constexpr double kLeastAdvanceShare = 0.05;   // below, a share is 0, so that few shrinkings decide
   std::vector<double> shares(layers.num_strands(), 1.0);
   std::vector<Vec3> state(wanted.begin(), wanted.end());
   for (;;) {
@@ -108,7 +109,7 @@ std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, c
     for (const Index strand : held) {
       double& share = shares[strand];
       moved = moved || share > 0;
-      share = kShrink * share < kLeast ? 0 : kShrink * share;
+      share = kAdvanceShrinkFactor * share < kLeastAdvanceShare ? 0 : kAdvanceShrinkFactor * share;
     }
     if (!moved) break;  // valid, or the safe state was not valid
     grade(layers, shares);

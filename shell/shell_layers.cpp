@@ -90,7 +90,7 @@ std::vector<double> layer_shares(int num_layers, double growth) {
 
 double growth_of_layers(double thickness, double first_height, int num_layers) {
   // Ratios of successive layers that are looked for; others are of no use.
-  constexpr double kLeastGrowth = 0.01, kMostGrowth = 100;
+  constexpr double kLeastLayerGrowth = 0.01, kMostLayerGrowth = 100;
   const auto text = [](double x) { return formatted("%.6g", x); };
   if (!(thickness > 0) || !(first_height > 0) || !std::isfinite(thickness) || num_layers < 1)
     throw InputError("shell: thickness, first height and number of layers must be positive");
@@ -104,7 +104,7 @@ double growth_of_layers(double thickness, double first_height, int num_layers) {
     throw InputError("shell: one layer is as thick as the shell, " + text(thickness) + ", but its height is to be " +
                      text(first_height) + "; ask for more layers, or for a growth");
   }
-  double low = kLeastGrowth, high = kMostGrowth;
+  double low = kLeastLayerGrowth, high = kMostLayerGrowth;
   if (!(sum(low) <= thickness))
     throw InputError("shell: a first layer " + text(first_height) + " high leaves no room for " +
                      std::to_string(num_layers - 1) + " more within a thickness of " + text(thickness));
@@ -139,10 +139,11 @@ int number_of_layers(double thickness, double first_height, double growth) {
 
 void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,
                             double growth) {
-  constexpr double kLeastShare = 1e-13;  // of the largest coordinate: some hundred units of its last digit
+  // Of the largest coordinate: some hundred units of its last digit.
+  constexpr double kLeastVisibleThicknessShare = 1e-13;
   double largest = 0;
   for (const Vec3& p : surface.positions) largest = std::max(largest, p.lpNorm<Eigen::Infinity>());
-  const double least = kLeastShare * largest;
+  const double least = kLeastVisibleThicknessShare * largest;
   const double first = layer_shares(num_layers, growth)[1] * thickness;
   const double thinnest = first * std::min(1.0, std::pow(growth, num_layers - 1));
   const std::string expected = formatted(" vanishes beside the surface; expected at least %.3g", least);

@@ -54,13 +54,13 @@ struct Neighbors {
 
 /// Works like Dijkstra's algorithm: a vertex that was lowered limits its neighbors, the thinnest first.
 void limit_slope(const Neighbors& neighbors, std::span<double> thickness) {
-  constexpr double kSlope = 0.5;  // of the thickness along the surface: an angle of 27 degrees
+  constexpr double kMostThicknessSlope = 0.5;  // of the thickness along the surface: an angle of 27 degrees
   using Entry = std::pair<double, Index>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   const auto spread = [&](double t, Index v) {
     for (std::size_t i = neighbors.offsets[v]; i < neighbors.offsets[v + 1]; ++i) {
       const auto& [w, length] = neighbors.list[i];
-      const double most = t + kSlope * length;
+      const double most = t + kMostThicknessSlope * length;
       if (thickness[w] <= most) continue;
       thickness[w] = most;
       queue.push({most, w});
@@ -87,7 +87,7 @@ std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const
                                       std::span<const double> asked) {
   // Share of the gap, so that two strands leave a tenth of it, and the least share of the thickness asked for, which
   // keeps it positive.
-  constexpr double kShare = 0.45, kLeast = 1e-4;
+  constexpr double kMostGapShare = 0.45, kLeastThicknessShare = 1e-4;
   std::vector<double> thickness(asked.begin(), asked.end());
   const TriangleMesh surface = triangulate(layers.surface);
   const double diagonal = bounding_box_diagonal(surface);
@@ -98,7 +98,7 @@ std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const
     for (std::size_t v = 0; v < gaps.size(); ++v) {
       double& t = thickness[first + v];
       t = std::min(t, diagonal);
-      t = std::max(std::min(t, kShare * gaps[v]), kLeast * t);
+      t = std::max(std::min(t, kMostGapShare * gaps[v]), kLeastThicknessShare * t);
     }
   };
   if (layers.inside > 0) limit(0, -1);
@@ -130,7 +130,7 @@ MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const V
 }
 
 void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions) {
-  constexpr double kLeastVisibility = 0.1;  // cosine between a turned direction and the normals around it: 84 degrees
+  constexpr double kLeastTurnedVisibility = 0.1;  // cosine between a turned direction and normals around it: 84 degrees
   const PolygonMesh& surface = layers.surface;
   std::vector<double> visibility(layers.num_columns(), 1);
   std::vector<Vec3> turned(directions.begin(), directions.end());
@@ -145,8 +145,10 @@ void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions) {
       visibility[v] = std::min(visibility[v], seen);
     }
   for (std::size_t v = 0; v < turned.size(); ++v) {
-    if (visibility[v] >= kLeastVisibility) directions[v] = turned[v];
-    else layers.planes.release(static_cast<Index>(v));
+    if (visibility[v] >= kLeastTurnedVisibility)
+      directions[v] = turned[v];
+    else
+      layers.planes.release(static_cast<Index>(v));
   }
 }
 
@@ -164,13 +166,13 @@ double distance_from_planes(const ShellLayers& layers, std::span<const Vec3> pos
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
                                  std::span<const double> thickness, const std::function<bool()>& cancelled,
                                  const std::function<std::string(std::span<const Index>)>& names) {
-  constexpr double kShareOfEdge = 0.02;  // of the shortest edge at a vertex: the first thickness that is tried
-  constexpr int kMaxHalvings = 30;       // 1e-9 of the first thickness is none
+  constexpr double kThinShellEdgeShare = 0.02;  // of the shortest edge at a vertex: the first thickness that is tried
+  constexpr int kMaxHalvings = 30;              // 1e-9 of the first thickness is none
   const std::size_t n = layers.num_columns();
   std::vector<double> thin(thickness.begin(), thickness.end());
   for_each_edge(layers, [&](Index a, Index b, double length) {
     for (const Index v : {a, b})
-      for (double* t : {&thin[v], &thin[n + v]}) *t = std::min(*t, kShareOfEdge * length);
+      for (double* t : {&thin[v], &thin[n + v]}) *t = std::min(*t, kThinShellEdgeShare * length);
   });
   bool ended = false;
   const auto is_to_end = [&] { return ended = ended || (cancelled && cancelled()); };

@@ -34,7 +34,7 @@ constexpr std::size_t kManySamples = 2'000'000;
 /// Samples in a square of the spacing that triangles of a usual shape do not exceed: halving longest edges makes 4
 /// to 20.
 constexpr double kMostInSquare = 32;
-constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this count as 0
+constexpr double kRimBarycentricTolerance = 1e-9;  // barycentric coordinates up to this count as 0
 
 /// Sizes of the cells of a cloud's grid, in units of its points' spacing: first cells with about ten points each if the
 /// surface passes straight through them, then larger ones.
@@ -189,8 +189,8 @@ void TargetSurface::set_volume(double volume) {
 bool TargetSurface::on_rim(Index triangle, const std::array<double, 3>& barycentric) const {
   const unsigned parts = rim_parts_[triangle];
   for (int k = 0; k < 3; ++k) {
-    if (barycentric[(k + 2) % 3] <= kOnEdge && parts >> k & 1) return true;
-    if (barycentric[k] >= 1 - kOnEdge && parts >> (3 + k) & 1) return true;
+    if (barycentric[(k + 2) % 3] <= kRimBarycentricTolerance && parts >> k & 1) return true;
+    if (barycentric[k] >= 1 - kRimBarycentricTolerance && parts >> (3 + k) & 1) return true;
   }
   return false;
 }

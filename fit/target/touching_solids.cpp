@@ -38,8 +38,8 @@ bool crosses(const TriangleMesh& mesh, const std::function<bool()>& cancelled) {
 }  // namespace
 
 std::string TouchingSolids::text() const {
-  constexpr std::size_t kMost = 10;
-  const std::size_t count = regions.regions.size(), listed = std::min(count, kMost);
+  constexpr std::size_t kMostSolidNames = 10;
+  const std::size_t count = regions.regions.size(), listed = std::min(count, kMostSolidNames);
   std::string names;
   for (std::size_t r = 0; r < listed; ++r)
     names += (r == 0 ? "" : r + 1 == count ? " and " : ", ") + regions.regions[r].name;

@@ -19,7 +19,7 @@ using namespace internal;
 
 namespace {
 
-constexpr double kSlack = std::numbers::pi / 180;  // one degree: angles this close to straight are noise
+constexpr double kStraightAngleSlack = std::numbers::pi / 180;  // one degree: angles this close to straight are noise
 
 void find_nonmanifold(const MeshTopology& topology, SubdivisionAudit& result) {
   std::vector<int> counts(topology.num_edges(), 0);
@@ -90,7 +90,7 @@ bool is_reflex(const SurfaceTopology& surface, Index e, std::span<const Vec3> po
   const Vec3 along = points[surface.corner_vertices[surface.next(h)]] - points[surface.corner_vertices[h]];
   const Vec3 left = face_normal(surface, surface.corner_faces[h], points);
   const Vec3 right = face_normal(surface, surface.corner_faces[surface.twins[h]], points);
-  return left.cross(right).dot(along.normalized()) < -std::sin(kSlack);
+  return left.cross(right).dot(along.normalized()) < -std::sin(kStraightAngleSlack);
 }
 
 double corner_angle(const SurfaceTopology& surface, Index h, std::span<const Vec3> points) {
@@ -119,7 +119,7 @@ std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::s
       span += corner_angle(surface, h, points);
       inside.push_back(edge(h));
     }
-    if (span > std::numbers::pi + kSlack) folding.insert(folding.end(), inside.begin(), inside.end());
+    if (span > std::numbers::pi + kStraightAngleSlack) folding.insert(folding.end(), inside.begin(), inside.end());
   } while (h != start && h != kNoIndex);
   return folding;
 }

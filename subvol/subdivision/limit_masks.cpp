@@ -96,9 +96,9 @@ Row crease_limit(const Ring& ring, int a, int b) {
 }
 
 Row dart_limit(const RingSharpness& sharpness) {
-  constexpr int kRefinements = 512;  // by then the powers of the next eigenvalue vanish for usual valences
+  constexpr int kDartLimitRefinements = 512;  // by then the powers of the next eigenvalue vanish for usual valences
   Row mask = Row::Unit(2 * static_cast<int>(sharpness.edges.size()) + 1, 0);
-  for (int i = 0; i < kRefinements; ++i) mask = before_refinement(mask, sharpness);
+  for (int i = 0; i < kDartLimitRefinements; ++i) mask = before_refinement(mask, sharpness);
   return mask / mask.sum();
 }
 
@@ -184,10 +184,10 @@ std::array<Row, 2> sector_tangents(const Ring& ring, int first, int count, bool 
 
 /// Returns what is left of the smooth tangents after many refinements, scaled back: there is no closed form.
 std::array<Row, 2> dart_tangents(const RingSharpness& sharpness) {
-  constexpr int kRefinements = 24;  // by then, only the tangents are left
+  constexpr int kDartTangentRefinements = 24;  // by then, only the tangents are left
   std::array<Row, 2> tangents = smooth_tangents({static_cast<int>(sharpness.edges.size())});
   for (Row& tangent : tangents)
-    for (int i = 0; i < kRefinements; ++i) tangent = 2 * before_refinement(tangent, sharpness);
+    for (int i = 0; i < kDartTangentRefinements; ++i) tangent = 2 * before_refinement(tangent, sharpness);
   return tangents;
 }
 

@@ -82,7 +82,7 @@ struct LimitPatches::Block {
   int turn;  // the quad's corner of lowest parameters
   int u, v;  // the lowest parameters
   std::size_t first_u, last_u, first_v, last_v;
-  int size() const { return kUnits >> level; }
+  int size() const { return kPatchSideUnits >> level; }
   bool empty() const { return first_u == last_u || first_v == last_v; }
 };
 
@@ -103,7 +103,7 @@ void LimitPatches::classify(Level& level, std::size_t num_faces) const {
 }
 
 void LimitPatches::prepare(int depth) {
-  assert(depth <= kMaxDepth);
+  assert(depth <= kMostPatchDepth);
   while (static_cast<int>(levels_.size()) <= depth) {
     Level& last = levels_.back();
     std::vector<Index> irregular;

@@ -274,11 +274,11 @@ std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<
     }
   }
   // Tangents this close to parallel define no normal: a hundred times the rounding error of their rows.
-  constexpr double kParallel = 1e-10;
+  constexpr double kParallelTangentSine = 1e-10;
   std::vector<Vec3> normals(u.size());
   for (std::size_t s = 0; s < u.size(); ++s) {
     const Vec3 cross = u[s].cross(v[s]);
-    if (cross.norm() <= kParallel * u[s].norm() * v[s].norm())
+    if (cross.norm() <= kParallelTangentSine * u[s].norm() * v[s].norm())
       normals[s] = facets[s].normalized();
     else
       normals[s] = cross.dot(facets[s]) < 0 ? Vec3(-cross.normalized()) : Vec3(cross.normalized());

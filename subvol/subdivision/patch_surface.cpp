@@ -7,10 +7,10 @@ namespace subvol {
 
 Vec3 unit_normal(const Vec3& du, const Vec3& dv) {
   // Tangents this close to parallel define no normal: a hundred times the rounding error of their weights.
-  constexpr double kParallel = 1e-10;
+  constexpr double kParallelTangentSine = 1e-10;
   const Vec3 cross = du.cross(dv);
   const double length = cross.norm();
-  return length > kParallel * du.norm() * dv.norm() ? Vec3(cross / length) : Vec3(Vec3::Zero());
+  return length > kParallelTangentSine * du.norm() * dv.norm() ? Vec3(cross / length) : Vec3(Vec3::Zero());
 }
 
 PatchLayout patch_layout(const SurfaceTopology& boundary) {

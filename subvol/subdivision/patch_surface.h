@@ -12,14 +12,14 @@ namespace subvol {
 ///
 /// A patch is a quad of the boundary refined once: the part of a boundary face next to one of its corners.
 ///
-///   (0, kUnits) ------ (kUnits, kUnits)      corner 0 is a vertex of the mesh, corner 2 the center of the face;
-///       |  3          2  |                   sides 3-0 and 0-1 are halves of the mesh's edges. Across every side the
-///       |  0          1  |                   parameter along it runs the same way in the neighbor.
-///   (0, 0) ----------- (kUnits, 0)
+///   (0, n) ----------- (n, n)      n = kPatchSideUnits. Corner 0 is a vertex of the mesh, corner 2 the center of the
+///       |  3          2  |         face; sides 3-0 and 0-1 are halves of the mesh's edges. Across every side the
+///       |  0          1  |         parameter along it runs the same way in the neighbor.
+///   (0, 0) ----------- (n, 0)
 class PatchSurface {
  public:
-  static constexpr int kMaxDepth = 14;           ///< halvings of a side that parameters can tell apart
-  static constexpr int kUnits = 1 << kMaxDepth;  ///< parameters are integers from 0 to kUnits
+  static constexpr int kMostPatchDepth = 14;                    ///< halvings of a side that parameters can tell apart
+  static constexpr int kPatchSideUnits = 1 << kMostPatchDepth;  ///< parameters are integers from 0 to this
 
   virtual ~PatchSurface() = default;
 
@@ -32,7 +32,7 @@ class PatchSurface {
   /// Returns true for each of the patch's sides 0-1 and 3-0 that lies on a crease, of any sharpness.
   virtual const std::array<bool, 2>& sharp_sides(Index patch) const = 0;
 
-  /// Prepares for parameters that are multiples of kUnits / 2^depth; 0 <= depth <= kMaxDepth.
+  /// Prepares for parameters that are multiples of kPatchSideUnits / 2^depth; 0 <= depth <= kMostPatchDepth.
   virtual void prepare(int depth) = 0;
 
   /// Evaluates the surface at u.size() x v.size() parameters, u fastest; also its normals, unless null.

@@ -47,8 +47,8 @@ void SparseMap::apply_transposed(std::span<const Vec3> in, std::span<Vec3> out) 
     throw_sizes("SparseMap::apply_transposed", in.size(), num_rows(), out.size(), num_cols);
   // A fixed number of slices, each with its own accumulator: the order of every sum is the same for any number of
   // threads.
-  constexpr std::size_t kSlices = 8;
-  const std::size_t slices = num_rows() < 4096 ? 1 : kSlices;
+  constexpr std::size_t kTransposedProductSlices = 8;
+  const std::size_t slices = num_rows() < 4096 ? 1 : kTransposedProductSlices;
   std::vector<Vec3> partial(slices * num_cols, Vec3::Zero());
 #pragma omp parallel for schedule(static)
   for (std::size_t s = 0; s < slices; ++s) {

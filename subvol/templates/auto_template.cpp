@@ -43,8 +43,8 @@ struct Placement {
 };
 
 /// Edge lengths to try, relative to the length that follows from the count and the volume.
-constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
-constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
+constexpr std::array<double, 7> kCellSizeFactors{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
+constexpr double kLeastCellSizeFactor = *std::min_element(kCellSizeFactors.begin(), kCellSizeFactors.end());
 /// Largest number of cells of one grid, including the empty and spare ones, if `cells` are requested in the solid: half
 /// a gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
@@ -52,7 +52,7 @@ double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double
 /// Returns the frames whose grids have at most `most` cells in all if about `cells` of them lie in the solid. The
 /// farther apart the solid's parts are, or the thinner its walls, the more of a grid is empty.
 std::vector<Frame> frames_of_small_grids(double volume, std::size_t cells, double most, std::span<const Frame> frames) {
-  const double size = kLeastSize * std::cbrt(volume / static_cast<double>(cells));
+  const double size = kLeastCellSizeFactor * std::cbrt(volume / static_cast<double>(cells));
   std::vector<Frame> result;
   for (const Frame& frame : frames)
     if (cells_around(frame.box, size).prod() <= most) result.push_back(frame);
@@ -111,9 +111,9 @@ class Search {
   double pillowed_size(const Frame& frame) const;
   double size_through(const AxisPlanes& planes) const;
   std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const {
-    constexpr ShareRange kAccepted{kLeastCellShare, kMostCellShare};
+    constexpr ShareRange kAcceptedCellShares{kLeastCellShare, kMostCellShare};
     if (stop_.is_stopped()) return std::nullopt;
-    return best_in(placement.frame.axes, placed_grid(placement), kAccepted, num_right);
+    return best_in(placement.frame.axes, placed_grid(placement), kAcceptedCellShares, num_right);
   }
   std::optional<Candidate> best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
                                    std::size_t& num_right) const;
@@ -132,10 +132,10 @@ class Search {
 /// Cell size for which the inner cells of a grid and a layer around them add up to the requested count.
 double Search::pillowed_size(const Frame& frame) const {
   // The size is found to 0.14 %. kLines lines along each edge of a cell's face estimate its fraction.
-  constexpr int kHalvings = 10, kLines = 3;
+  constexpr int kPillowedSizeHalvings = 10, kLines = 3;
   const double plain = std::cbrt(solid_.volume / cells_);
   double low = plain, high = 4 * plain;
-  for (int i = 0; i < kHalvings && !stop_.is_stopped(); ++i) {
+  for (int i = 0; i < kPillowedSizeHalvings && !stop_.is_stopped(); ++i) {
     const double size = std::sqrt(low * high);
     const VoxelGrid grid = placed_grid({frame, size, {}});
     const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines, &stop_);
@@ -153,7 +153,7 @@ std::vector<Placement> Search::placements() const {
   for (const Frame& frame : frames_)
     sizes.push_back(options_.pillow ? pillowed_size(frame) : std::cbrt(solid_.volume / cells_));
   std::vector<Placement> result;
-  for (double factor : kSizes)
+  for (double factor : kCellSizeFactors)
     for (int offset = 0; offset < 8; ++offset)
       for (std::size_t f = 0; f < frames_.size(); ++f)
         result.push_back({frames_[f], factor * sizes[f], {(offset & 1) != 0, (offset & 2) != 0, (offset & 4) != 0}});
@@ -224,8 +224,8 @@ class SizeSearch {
   double size() const { return size_; }
   /// The count is `share` times the requested one.
   void correct(double share) {
-    constexpr double kMost = 8;  // largest share that is believed
-    step(share > 1, std::cbrt(std::clamp(share, 1 / kMost, kMost)));
+    constexpr double kMostBelievedShare = 8;  // no size changes as if the count were off by more
+    step(share > 1, std::cbrt(std::clamp(share, 1 / kMostBelievedShare, kMostBelievedShare)));
   }
   void be_finer() { step(false, 0.85); }   ///< the topology is out of reach
   void be_coarser() { step(true, 1.25); }  ///< the grid has too many cells
@@ -243,7 +243,8 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
                                               AutoTemplateResult& result) const {
   constexpr int kGrids = 5;               // grids of different sizes at most
   constexpr double kLeastAligned = 0.03;  // share of the area on planes below which these are no help
-  constexpr ShareRange kNear{0.8, 1.25}, kAccepted{kLeastShareThroughPlanes, kMostShareThroughPlanes};
+  constexpr ShareRange kNearCellShares{0.8, 1.25};
+  constexpr ShareRange kAcceptedSharesThroughPlanes{kLeastShareThroughPlanes, kMostShareThroughPlanes};
   std::optional<Candidate> best;
   SizeSearch search(size_through(planes));
   for (int attempt = 0; attempt < kGrids; ++attempt) {
@@ -271,11 +272,11 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
       continue;
     }
     const double share = found->share;
-    if (kAccepted.holds(share)) {
+    if (kAcceptedSharesThroughPlanes.holds(share)) {
       result.candidates += num_right;
       if (!best || std::abs(std::log(share)) < std::abs(std::log(best->share))) best = std::move(found);
     }
-    if (kNear.holds(share)) break;
+    if (kNearCellShares.holds(share)) break;
     search.correct(share);
   }
   return best;
@@ -284,10 +285,10 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
 bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
                  double fraction_share) {
   constexpr std::size_t kMostBatch = 16, kLeastBatch = 4;  // grids between two calls of the progress callback
-  constexpr double kEnough = 200;    // valid candidates after which a better one hardly ever turns up
+  constexpr double kEnoughCandidates = 200;                // valid ones, after which a better one hardly ever turns up
   constexpr double kUsual = 10'000;  // cells; of larger grids, which differ less, fewer are tried in proportion
   const double share = std::min(1.0, kUsual / cells_);
-  const double enough = share * kEnough;
+  const double enough = share * kEnoughCandidates;
   const auto batch = std::max(kLeastBatch, static_cast<std::size_t>(share * kMostBatch));
   const std::vector<Placement> all = placements();
   std::size_t right = 0;
@@ -367,7 +368,7 @@ AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplate
   if (most < 1) throw InputError("auto_templates: at least one template must be asked for");
   std::vector<Frame> frames;
   for (const Mat3& axes : template_frames(solid.surface)) frames.push_back({axes, box_in(axes, solid.surface)});
-  constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, kMostTemplateGrowth};
+  constexpr std::array<double, 10> kTemplateCountLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, kMostTemplateGrowth};
   AutoTemplateResult result;
   result.wanted = solid.topology;
   const double most_cells = most_grid_cells(options.cells);
@@ -376,8 +377,9 @@ AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplate
     planes = axis_planes(solid.surface, frame_along_planes(solid.surface));
     planes->levels = edge_levels(solid.surface, planes->frame, planes->tolerance);
   }
-  for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
-    const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
+  for (std::size_t rung = 0; rung < kTemplateCountLadder.size(); ++rung) {
+    const auto cells =
+        static_cast<std::size_t>(std::lround(kTemplateCountLadder[rung] * static_cast<double>(options.cells)));
     std::vector<Frame> usable = frames_of_small_grids(solid.volume, cells, most_cells, frames);
     const bool none_usable = usable.empty();
     Search search(solid, options, cells, std::move(usable));
@@ -392,9 +394,9 @@ AutoTemplateResult auto_templates(const SolidBoundary& solid, const AutoTemplate
     if (none_usable && rung == 0) throw too_sparse(cells, most_cells);
     if (none_usable) break;
     std::vector<Candidate> candidates;
-    const double done = static_cast<double>(rung) / kLadder.size();
+    const double done = static_cast<double>(rung) / kTemplateCountLadder.size();
     // Most often only the first count is needed.
-    if (!search.run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
+    if (!search.run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kTemplateCountLadder.size())) {
       result.cancelled = true;
       return result;
     }

@@ -17,16 +17,16 @@ using namespace internal;
 
 namespace {
 
-constexpr std::array<double, 3> kPlaces{1.0 / 6, 0.5, 5.0 / 6};  // centers of thirds
+constexpr std::array<double, 3> kCentersOfThirds{1.0 / 6, 0.5, 5.0 / 6};  // of an edge
 
 /// Appends 27 points spread over a cell in its canonical coordinates; for prisms and tets, the points of the cube are
 /// folded into the cell, and for pyramids its upper side is collapsed.
 void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& points) {
   const auto corner = [&](std::size_t i) -> const Vec3& { return mesh.positions[mesh.cell(c)[i]]; };
   const auto between = [](const Vec3& a, const Vec3& b, double t) -> Vec3 { return a + t * (b - a); };
-  for (double w : kPlaces)
-    for (double v : kPlaces)
-      for (double u : kPlaces) {
+  for (double w : kCentersOfThirds)
+    for (double v : kCentersOfThirds)
+      for (double u : kCentersOfThirds) {
         switch (mesh.kinds[c]) {
           case CellKind::hex:
             points.push_back(between(between(between(corner(0), corner(1), u), between(corner(3), corner(2), u), v),
@@ -82,16 +82,17 @@ VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t ce
 
 std::vector<char> cells_inside(const VolumeMesh& mesh, const TriangleMesh& surface, double least_share) {
   if (!(least_share > 0) || !(least_share <= 1)) throw InputError("carve: the least share must be in (0, 1]");
-  constexpr std::size_t kPoints = kPlaces.size() * kPlaces.size() * kPlaces.size();
+  constexpr std::size_t kCarvePointsPerCell =
+      kCentersOfThirds.size() * kCentersOfThirds.size() * kCentersOfThirds.size();
   std::vector<Vec3> points;
-  points.reserve(kPoints * mesh.num_cells());
+  points.reserve(kCarvePointsPerCell * mesh.num_cells());
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) append_points(mesh, c, points);
   const std::vector<double> winding = WindingNumber(surface).at(points);
   std::vector<char> inside(mesh.num_cells());
   for (std::size_t c = 0; c < inside.size(); ++c) {
-    const auto first = winding.begin() + static_cast<std::ptrdiff_t>(kPoints * c);
-    const auto count = std::count_if(first, first + kPoints, [](double w) { return w > 0.5; });
-    inside[c] = static_cast<double>(count) >= least_share * static_cast<double>(kPoints);
+    const auto first = winding.begin() + static_cast<std::ptrdiff_t>(kCarvePointsPerCell * c);
+    const auto count = std::count_if(first, first + kCarvePointsPerCell, [](double w) { return w > 0.5; });
+    inside[c] = static_cast<double>(count) >= least_share * static_cast<double>(kCarvePointsPerCell);
   }
   return inside;
 }

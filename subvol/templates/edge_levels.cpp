@@ -24,7 +24,7 @@ class LevelChoice {
       : levels_(levels),
         tolerance_(tolerance),
         size_(size),
-        least_length_(std::max(kLeastLength * size, kLeastShare * diagonal)) {}
+        least_length_(std::max(kLeastLevelLength * size, kLeastDiagonalShare * diagonal)) {}
 
   /// Inserts the levels that get one into lines, which are increasing.
   void add_to(std::vector<double>& lines) const {
@@ -37,27 +37,29 @@ class LevelChoice {
       const double at = levels_[i].position;
       const auto above = std::lower_bound(lines.begin(), lines.end(), at);
       if (above == lines.begin() || above == lines.end()) continue;
-      if (std::min(at - *std::prev(above), *above - at) < kThinnest * size_) continue;
+      if (std::min(at - *std::prev(above), *above - at) < kThinnestLevelCell * size_) continue;
       if (std::ranges::any_of(given, [&](double line) { return bounds_thin_part(levels_[i], line); }))
         lines.insert(above, at);
     }
   }
 
  private:
-  static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
-  static constexpr std::ptrdiff_t kLeastTurns = 2;                                // the rims at both ends of a hole
-  static constexpr double kLeastShare = 0.25;  // of the diagonal: a line passes through the whole part
+  // In units of the size.
+  static constexpr double kThinnestLevelCell = 1.0 / 12, kLeastLevelLength = 4, kMostThinPartWidth = 0.6;
+  static constexpr std::ptrdiff_t kLeastTurns = 2;     // the rims at both ends of a hole
+  static constexpr double kLeastDiagonalShare = 0.25;  // of the diagonal: a line passes through the whole part
 
   /// True if enough of a level's edges run close to edges on a line that is close, or if curves turn close to enough of
   /// these.
   bool bounds_thin_part(const EdgeLevel& level, double line) const {
-    if (std::abs(level.position - line) >= kLeastGap * size_) return false;
+    if (std::abs(level.position - line) >= kLeastLineGap * size_) return false;
     double length = 0;
     for (const EdgeLevel& other : levels_) {
       if (std::abs(other.position - line) > tolerance_ || other.length < least_length_) continue;
       const auto is_close = [&](const Vec3& p) {
-        return std::ranges::any_of(
-            other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
+        return std::ranges::any_of(other.segments, [&](const std::array<Vec3, 2>& segment) {
+          return distance(p, segment) < kMostThinPartWidth * size_;
+        });
       };
       if (std::ranges::count_if(sample(level.turns), is_close) >= kLeastTurns) return true;
       if (level.length < least_length_) continue;
@@ -73,8 +75,8 @@ class LevelChoice {
   /// Returns all of some items, or some hundreds that are evenly spread: each is compared with all edges of a level.
   template <class Item>
   static std::vector<Item> sample(const std::vector<Item>& items) {
-    constexpr std::size_t kMost = 300;  // items
-    const std::size_t step = std::max<std::size_t>(1, items.size() / kMost);
+    constexpr std::size_t kLevelSamples = 300;  // items
+    const std::size_t step = std::max<std::size_t>(1, items.size() / kLevelSamples);
     std::vector<Item> some;
     for (std::size_t i = 0; i < items.size(); i += step) some.push_back(items[i]);
     return some;
@@ -101,8 +103,8 @@ struct SharpEdges {
 /// edge, as if it were cut off there, or zero if there is none.
 /// sides  those of the mesh, sorted.
 std::vector<Vec3> normals_across_slivers(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
-  constexpr double kFlat = 1e-12;  // of the square of the longest edge
-  constexpr int kMostSteps = 8;    // from sliver to sliver
+  constexpr double kSliverAreaShare = 1e-12;  // of the square of the longest edge
+  constexpr int kMostSteps = 8;               // from sliver to sliver
   std::vector<Vec3> normals;
   std::vector<double> longest(mesh.triangles.size(), 0.0);  // squared; 0 for triangles with an area
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -110,7 +112,7 @@ std::vector<Vec3> normals_across_slivers(const TriangleMesh& mesh, std::span<con
     const Vec3 &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
     normals.push_back(doubled_area_vector(mesh, mesh.triangles[t]));
     const double length = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
-    if (normals[t].norm() <= kFlat * length) longest[t] = length;
+    if (normals[t].norm() <= kSliverAreaShare * length) longest[t] = length;
   }
   if (std::ranges::all_of(longest, [](double length) { return length == 0; })) return normals;
   std::vector<Index> across(mesh.triangles.size(), kNoIndex);
@@ -211,16 +213,16 @@ void add_lines_at_levels(const std::vector<EdgeLevel>& levels, double diagonal, 
 }
 
 void empty_cells_at_chamfers(const VoxelGrid& grid, std::vector<double>& fractions) {
-  constexpr double kLeast = 0.25, kMost = 0.75;  // of a cell that is cut along a diagonal
+  constexpr double kLeastChamferFraction = 0.25, kMostChamferFraction = 0.75;  // of a cell that is cut along a diagonal
   std::array<std::vector<char>, 3> is_thin;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<double>& lines = grid.lines[axis];
     const double size = lines[1] - lines[0];  // of a spare layer
     for (std::size_t i = 0; i + 1 < lines.size(); ++i)
-      is_thin[axis].push_back(lines[i + 1] - lines[i] < kLeastGap * size);
+      is_thin[axis].push_back(lines[i + 1] - lines[i] < kLeastLineGap * size);
   }
   for (std::size_t c = 0; c < fractions.size(); ++c) {
-    if (fractions[c] < kLeast || fractions[c] > kMost) continue;
+    if (fractions[c] < kLeastChamferFraction || fractions[c] > kMostChamferFraction) continue;
     const std::array<int, 3> at = grid.place(static_cast<Index>(c));
     int thin = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) thin += is_thin[axis][static_cast<std::size_t>(at[axis])];

@@ -14,7 +14,7 @@ namespace subvol::internal {
 inline constexpr double kAlongAxis = 0.9998;
 
 /// Smallest distance of two lines of a grid, in units of its cells' size, unless something thin lies between them.
-inline constexpr double kLeastGap = 0.4;
+inline constexpr double kLeastLineGap = 0.4;
 
 /// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it, and points at which smooth
 /// curves of sharp edges come no farther along the axis, such as those of a hole's rim that are closest to a wall.
@@ -35,7 +35,7 @@ std::array<std::vector<EdgeLevel>, 3> edge_levels(const TriangleMesh& surface, c
 
 /// Adds lines at levels of edges to the lines of a grid along one axis, where a cell could not hold what is between.
 ///
-/// Levels are taken, the longest first, if they are closer than `kLeastGap` size to a line that is given, but by at
+/// Levels are taken, the longest first, if they are closer than `kLeastLineGap` size to a line that is given, but by at
 /// least 1/12 size to all: a chamfer, a ledge or a thin wall then lies between two lines. Their edges must run along
 /// others on the given line, closer than 0.6 size, for a quarter of the diagonal and for 4 size at least; or two
 /// curves, such as the rims of a hole, must turn that close to edges on the given line that are so long in all.

@@ -142,7 +142,7 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
 }
 
 VoxelLabels LabelSheets::cleaned() {
-  constexpr int kRounds = 4;  // making points good may leave specks, and dropping these may make points bad
+  constexpr int kSpeckRepairRounds = 4;  // making points good may leave specks, and dropping these may make points bad
   const auto [nx, ny, nz] = grid_.counts;
   VoxelLabels labels({nx + 2 * kRim, ny + 2 * kRim, nz + 2 * kRim}, static_cast<int>(values_.size()),
                      VertexRule::manifold);
@@ -172,7 +172,7 @@ VoxelLabels LabelSheets::cleaned() {
       throw InputError("segmentation: label " + std::to_string(values_[r]) +
                        " has only specks of fewer than " + std::to_string(options_.least_voxels) + " voxels");
   std::vector<char> changes(labels.num_cells(), 0);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kSpeckRepairRounds; ++round) {
     // An edge of four faces may stay. It does no harm.
     make_points_good(labels, share, changes, &stop_);
     if (stop_.is_stopped()) break;
@@ -273,7 +273,7 @@ void LabelSheets::find_neighbors() {
 }
 
 void LabelSheets::smooth() {
-  constexpr double kForth = 0.5, kBack = -0.53, kMostMove = 1;  // voxels
+  constexpr double kForth = 0.5, kBack = -0.53, kMostSmoothingMove = 1;  // voxels
   std::vector<Vec3> next(positions_.size());
   for (int round = 0; round < options_.rounds && !stop_.is_stopped(); ++round)
     for (const double step : {kForth, kBack}) {
@@ -285,7 +285,7 @@ void LabelSheets::smooth() {
         for (std::size_t i = offsets_[v]; i < offsets_[v + 1]; ++i) mean += positions_[neighbors_[i]];
         next[v] += step * (mean / static_cast<double>(count) - positions_[v]);
         const Vec3 moved = next[v] - start_[v];
-        if (moved.norm() > kMostMove) next[v] = start_[v] + kMostMove / moved.norm() * moved;
+        if (moved.norm() > kMostSmoothingMove) next[v] = start_[v] + kMostSmoothingMove / moved.norm() * moved;
       }
       std::swap(positions_, next);
     }
@@ -311,14 +311,15 @@ std::vector<double> LabelSheets::volumes() const {
 /// Moves each sheet along its normals: of all moves that give the regions their volumes to first order, the one with
 /// the least integral of its square.
 void LabelSheets::restore_volumes() {
-  constexpr int kRounds = 8;                         // Newton steps at most; they end at kEnough
-  constexpr double kEnough = 1e-5, kMostStep = 0.3;  // relative; voxels
+  constexpr int kMostVolumeNewtonSteps = 8;          // they end at kRelativeVolumeTolerance
+  constexpr double kRelativeVolumeTolerance = 1e-5;  // of each region
+  constexpr double kMostSheetStep = 0.3;             // voxels
   std::map<std::array<int, 2>, Index> sheet_of_pair;
   for (const Face& face : faces_) sheet_of_pair.try_emplace(face.pair, 0);
   Index count = 0;
   for (auto& [pair, number] : sheet_of_pair) number = count++;
   const auto n = static_cast<Eigen::Index>(values_.size());
-  for (int round = 0; round < kRounds && !stop_.is_stopped(); ++round) {
+  for (int round = 0; round < kMostVolumeNewtonSteps && !stop_.is_stopped(); ++round) {
     const std::vector<double> now = volumes();
     Eigen::VectorXd missing(n);
     double worst = 0;
@@ -327,7 +328,7 @@ void LabelSheets::restore_volumes() {
       missing[r] = wanted_[place] - now[place];
       worst = std::max(worst, std::abs(missing[r]) / wanted_[place]);
     }
-    if (worst < kEnough) return;
+    if (worst < kRelativeVolumeTolerance) return;
     std::vector<double> area(static_cast<std::size_t>(count), 0.0);
     for (const Face& face : faces_)
       area[static_cast<std::size_t>(sheet_of_pair[face.pair])] += area_vector(face, positions_).norm();
@@ -348,7 +349,7 @@ void LabelSheets::restore_volumes() {
     for (const auto& [pair, number] : sheet_of_pair)
       step[static_cast<std::size_t>(number)] =
           std::clamp((pair[0] == kOutside ? 0 : y[pair[0] - 1]) - (pair[1] == kOutside ? 0 : y[pair[1] - 1]),
-                     -kMostStep, kMostStep);
+                     -kMostSheetStep, kMostSheetStep);
     for (std::size_t first = 0, last; first < normals.size();) {
       const Index v = normals[first].first.first;
       Mat3 sum = 1e-3 * Mat3::Identity();
@@ -363,7 +364,7 @@ void LabelSheets::restore_volumes() {
         first = last;
       }
       const Vec3 move = sum.ldlt().solve(right);
-      positions_[v] += move.norm() > kMostStep ? Vec3(kMostStep / move.norm() * move) : move;
+      positions_[v] += move.norm() > kMostSheetStep ? Vec3(kMostSheetStep / move.norm() * move) : move;
     }
   }
 }

@@ -28,8 +28,8 @@ namespace {
 
 // With less than 1/6, no cell of a mesh of equal cubes can be inverted: each edge keeps more than half its length in
 // its own direction.
-constexpr double kShare = 0.15;
-constexpr double kSameNormal = 0.99;  // cosine above which two faces count as one plane
+constexpr double kPillowStepShare = 0.15;
+constexpr double kPillowSamePlaneCosine = 0.99;  // cosine above which two faces count as one plane
 
 std::vector<char> marked(const VolumeMesh& mesh, std::span<const Index> cells) {
   std::vector<char> in_set(mesh.num_cells(), cells.empty());
@@ -114,23 +114,24 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> 
   for (const SetFace& face : faces) {
     const Vec3 n = normal_of_face(mesh.positions, face.vertices());
     for (Index v : face.vertices())
-      if (std::none_of(normals[v].begin(), normals[v].end(), [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
+      if (std::none_of(normals[v].begin(), normals[v].end(),
+                       [&](const Vec3& m) { return m.dot(n) > kPillowSamePlaneCosine; }))
         normals[v].push_back(n);
   }
   std::vector<Vec3> steps(mesh.num_vertices(), Vec3::Zero());
   for (std::size_t v = 0; v < steps.size(); ++v)
-    for (const Vec3& n : normals[v]) steps[v] -= kShare * shortest[v] * n;
+    for (const Vec3& n : normals[v]) steps[v] -= kPillowStepShare * shortest[v] * n;
   return steps;
 }
 
 /// Halves the steps of the vertices of inverted cells until no cell is inverted, or until nothing is left of a step.
 void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps) {
-  constexpr int kRounds = 20;  // 1e-6 of a step is none
+  constexpr int kMostPillowHalvings = 20;  // 1e-6 of a step is none
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < number.size(); ++v)
     if (number[v] != kNoIndex) old[number[v]] = static_cast<Index>(v);
   std::vector<double> share(number.size(), 1.0);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kMostPillowHalvings; ++round) {
     std::vector<char> shorten(number.size(), 0);
     bool any = false;
     for (std::size_t c = 0; c < mesh.num_cells(); ++c) {

@@ -77,8 +77,9 @@ Mat3 turned_onto(const Mat3& frame, const Mat3& sums) {
 
 /// Turns a frame onto the planes that are a few degrees from its axes, in steps that leave ever more of fillets out.
 Mat3 turned_onto_planes(Mat3 frame, const std::vector<Vec3>& areas) {
-  constexpr double kWidest = 0.15, kNarrowest = 2e-4, kStep = 0.5;  // of cones around the axes, radians
-  for (double angle = kWidest; angle > kNarrowest; angle *= kStep)
+  constexpr double kWidestAxisCone = 0.15, kNarrowestAxisCone = 2e-4;  // radians
+  constexpr double kConeAngleFactor = 0.5;
+  for (double angle = kWidestAxisCone; angle > kNarrowestAxisCone; angle *= kConeAngleFactor)
     frame = turned_onto(frame, facing_sums(frame, areas, std::cos(angle)));
   return frame;
 }
@@ -195,8 +196,8 @@ class PlaneChoice {
  public:
   PlaneChoice(const TriangleMesh& surface, const AxisPlanes& all, std::size_t axis, double size)
       : least_area_(kLeastPlane * size * size),
-        least_gap_(kLeastGap * size),
-        samples_(surface, all, axis, size / kSamples) {
+        least_gap_(kLeastLineGap * size),
+        samples_(surface, all, axis, size / kPlaneSamplesPerSize) {
     for (const AxisPlane& plane : all.planes[axis])
       if (plane.whole_area() > least_area_) planes_.push_back(&plane);
     choose();
@@ -210,7 +211,7 @@ class PlaneChoice {
   }
 
  private:
-  static constexpr double kSamples = 4;  // per size of a cell
+  static constexpr double kPlaneSamplesPerSize = 4;  // per size of a cell
 
   bool close(std::size_t low, std::size_t high) const {
     return planes_[high]->position - planes_[low]->position < least_gap_;
@@ -268,7 +269,7 @@ std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all
   std::vector<double> lines = PlaneChoice(surface, all, axis, size).positions();
   const double low = all.low[static_cast<Index>(axis)], high = all.high[static_cast<Index>(axis)];
   if (lines.empty()) return {low, high};
-  const double below = lines.front() - low, above = high - lines.back(), least = kLeastGap * size;
+  const double below = lines.front() - low, above = high - lines.back(), least = kLeastLineGap * size;
   const bool single = lines.size() == 1;  // then one end at least is taken, however near
   if (below >= least || (single && below > above)) lines.insert(lines.begin(), low);
   if (above >= least || (single && below <= above)) lines.push_back(high);

@@ -30,11 +30,12 @@ using Marks = std::uint8_t;
 
 constexpr int kWhole = 6;  // of an edge, whose halves and thirds are whole numbers then
 
-constexpr std::array<Place, 8> kCorners = {
+constexpr std::array<Place, 8> kHexCornerPlaces = {
     {{0, 0, 0}, {6, 0, 0}, {6, 6, 0}, {0, 6, 0}, {0, 0, 6}, {6, 0, 6}, {6, 6, 6}, {0, 6, 6}}};
 
 int corner_at(const Place& place) {
-  return static_cast<int>(std::find(kCorners.begin(), kCorners.end(), place) - kCorners.begin());
+  return static_cast<int>(std::find(kHexCornerPlaces.begin(), kHexCornerPlaces.end(), place) -
+                          kHexCornerPlaces.begin());
 }
 
 /// Four quads between a line that is cut into three and one that is not:
@@ -55,7 +56,7 @@ class Pattern {
   void add_box(const Place& low, const Place& high) {
     HexPlaces hex;
     for (std::size_t i = 0; i < 8; ++i)
-      for (std::size_t d = 0; d < 3; ++d) hex[i][d] = kCorners[i][d] == 0 ? low[d] : high[d];
+      for (std::size_t d = 0; d < 3; ++d) hex[i][d] = kHexCornerPlaces[i][d] == 0 ? low[d] : high[d];
     hexes.push_back(hex);
   }
 
@@ -168,7 +169,7 @@ std::vector<Turn> make_turns() {
 Marks turned_marks(Marks marks, const Turn& turn) {
   unsigned result = 0;
   for (int i = 0; i < 8; ++i)
-    if (marks >> i & 1) result |= 1u << corner_at(turn(kCorners[i]));
+    if (marks >> i & 1) result |= 1u << corner_at(turn(kHexCornerPlaces[i]));
   return static_cast<Marks>(result);
 }
 
@@ -314,7 +315,7 @@ class PlaceNumbers {
     int f = 0;
     const auto lies_in = [&](int face) {
       return std::all_of(hex.faces[face].begin(), hex.faces[face].end(),
-                         [&](int i) { return kCorners[i][axis] == place[axis]; });
+                         [&](int i) { return kHexCornerPlaces[i][axis] == place[axis]; });
     };
     while (!lies_in(f)) ++f;
     const Index face = topology_.cell_faces(cell_)[f];
@@ -328,7 +329,7 @@ class PlaceNumbers {
       double weight = 1;
       for (std::size_t d = 0; d < 3; ++d) {
         const double t = place[d] / static_cast<double>(kWhole);
-        weight *= kCorners[i][d] == 0 ? 1 - t : t;
+        weight *= kHexCornerPlaces[i][d] == 0 ? 1 - t : t;
       }
       sum += weight * mesh_.positions[mesh_.cell(cell_)[i]];
     }

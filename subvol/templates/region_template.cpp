@@ -220,12 +220,12 @@ RegionSearch::Faults RegionSearch::faults_of(const VoxelLabels& labels, const Re
 }
 
 bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_length, std::vector<double>& weights) {
-  constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
+  constexpr double kRegionWeightRaise = 1.7, kThinRegionCells = 4;  // regions that are thicker need no weight
   bool raised = false;
   for (std::size_t r = 0; r < is_wrong.size(); ++r) {
     misses_[r] += is_wrong[r] != 0;
-    if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThin * cell_length) continue;
-    weights[r + 1] *= kRaise;
+    if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThinRegionCells * cell_length) continue;
+    weights[r + 1] *= kRegionWeightRaise;
     raised = true;
   }
   return raised;
@@ -233,9 +233,10 @@ bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_len
 
 std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
   constexpr int kGrids = 5;  // grids of different sizes at most
-  // Counts between kLeast and kMost times the one asked for are near it. A grid without right regions makes the next
-  // size finer, one without room for planes coarser. No size changes as if counts were off by more than kBelieved.
-  constexpr double kLeast = 0.6, kMost = 1.25, kFiner = 0.85, kCoarser = 1.25, kBelieved = 8;
+  constexpr double kLeastNearCountShare = 0.6, kMostNearCountShare = 1.25;  // of the count asked for
+  // A grid without right regions makes the next size finer, one without room for planes coarser.
+  constexpr double kFinerSizeFactor = 0.85, kCoarserSizeFactor = 1.25;
+  constexpr double kMostBelievedShare = 8;  // no size changes as if counts were off by more
   std::optional<LabeledGrid> best;
   double size = size_for(cells, options_.for_pillow), finer = 0, coarser = 0;
   const auto step = [&](bool too_fine, double factor) {
@@ -245,7 +246,7 @@ std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, 
   for (int attempt = 0; attempt < kGrids && !stop_.is_stopped(); ++attempt) {
     auto lines = lines_through_planes(surface_.mesh, planes, size, most_cells);
     if (lines[0].empty()) {
-      step(true, kCoarser);
+      step(true, kCoarserSizeFactor);
       continue;
     }
     const double aligned = share_on_lines(planes, lines);
@@ -253,21 +254,23 @@ std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, 
     std::optional<LabeledGrid> found =
         labeled(grid_through(planes.frame, with_spare_layers(std::move(lines), size)), cells, aligned > kAllPlanes);
     if (!found) {
-      step(false, kFiner);
+      step(false, kFinerSizeFactor);
       continue;
     }
     found->aligned = aligned;
     const double share = found->share;
-    const bool is_near = share >= kLeast && share <= kMost;
-    if (!best || is_better(*found, *best) || (is_near && !(best->share <= kMost))) best = std::move(found);
+    const bool is_near = share >= kLeastNearCountShare && share <= kMostNearCountShare;
+    if (!best || is_better(*found, *best) || (is_near && !(best->share <= kMostNearCountShare)))
+      best = std::move(found);
     if (is_near && best->wrong_sheets == 0) break;
-    step(share > 1, std::cbrt(std::clamp(share, 1 / kBelieved, kBelieved)));
+    step(share > 1, std::cbrt(std::clamp(share, 1 / kMostBelievedShare, kMostBelievedShare)));
   }
   return best;
 }
 
 std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
-  constexpr double kMost = 1.25;  // share of the count asked for, or its inverse, beyond which the size is corrected
+  // Share of the count asked for, or its inverse, beyond which the size is corrected.
+  constexpr double kMostUncorrectedShare = 1.25;
   constexpr std::array<double, 3> kCubeSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
@@ -284,7 +287,8 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
         if (stop_.is_stopped()) return std::nullopt;
         std::optional<LabeledGrid> found = labeled_cubes(frame, factor * size, offset);
         if (!found) continue;
-        if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
+        if (found->share > kMostUncorrectedShare || found->share < 1 / kMostUncorrectedShare) {
+          // The estimate was wrong: for all grids alike.
           const double corrected = size * std::cbrt(found->share);
           found = labeled_cubes(frame, factor * corrected, offset);
           if (found) size = corrected;
@@ -313,8 +317,9 @@ RegionTemplate RegionSearch::finished(const LabeledGrid& candidate, std::size_t 
 }
 
 RegionTemplateResult RegionSearch::run() {
-  constexpr std::array<double, 8> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9};
-  constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
+  constexpr std::array<double, 8> kRegionCountLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9};
+  // Cells of a grid, empty ones counted, for each one requested.
+  constexpr double kGridRoomPerCell = 64, kLeastGridRoom = 1e6;
   const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
   RegionTemplateResult result;
   if (stop_.is_stopped()) {  // the topology is not known then
@@ -323,12 +328,12 @@ RegionTemplateResult RegionSearch::run() {
   }
   std::optional<LabeledGrid> best;
   std::size_t asked = 0;
-  for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
-    fraction_ = rung == 0 ? 0 : static_cast<double>(rung) / kLadder.size();
+  for (std::size_t rung = 0; rung < kRegionCountLadder.size(); ++rung) {
+    fraction_ = rung == 0 ? 0 : static_cast<double>(rung) / kRegionCountLadder.size();
     if (options_.progress && !options_.progress(fraction_)) result.cancelled = true;
     if (result.cancelled) return result;
-    const double cells = kLadder[rung] * static_cast<double>(options_.cells);
-    const double most_cells = kLeastRoom + kRoom * cells;
+    const double cells = kRegionCountLadder[rung] * static_cast<double>(options_.cells);
+    const double most_cells = kLeastGridRoom + kGridRoomPerCell * cells;
     std::optional<LabeledGrid> found = best_through(planes, cells, most_cells);
     if (!found && !stop_.is_stopped()) found = best_of_cubes(cells, most_cells);
     if (stop_.is_stopped()) {

@@ -50,14 +50,14 @@ Mat3 principal_frame(const std::vector<Facet>& facets) {
 
 /// Facing directions, up to sign, ordered by the area that faces them, the largest first.
 std::vector<Vec3> facing_directions(const std::vector<Facet>& facets) {
-  constexpr double kBins = 8;  // per unit: neighboring bins are about 7 degrees apart
+  constexpr double kDirectionBinsPerUnit = 8;  // neighboring bins are about 7 degrees apart
   std::map<std::array<int, 3>, Vec3> bins;
   for (const Facet& f : facets) {
     const double area = f.area_vector.norm();
     if (!(area > 0)) continue;
     std::array<int, 3> key{};
     for (std::size_t a = 0; a < 3; ++a)
-      key[a] = static_cast<int>(std::lround(kBins * f.area_vector[static_cast<Index>(a)] / area));
+      key[a] = static_cast<int>(std::lround(kDirectionBinsPerUnit * f.area_vector[static_cast<Index>(a)] / area));
     const std::array<int, 3> opposite{-key[0], -key[1], -key[2]};
     Vec3& sum = bins.try_emplace(std::max(key, opposite), Vec3::Zero()).first->second;
     sum += key >= opposite ? f.area_vector : Vec3(-f.area_vector);

@@ -156,7 +156,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
 }
 
 bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
-  constexpr int kMostFlips = 3;  // per cell: repairs may undo each other forever
+  constexpr int kMostVoxelFlips = 3;  // per cell: repairs may undo each other forever
   std::vector<char> flips(solid.num_cells(), 0);
   std::vector<Index> bad;
   for (std::size_t p = 0; p < solid.num_points(); ++p)
@@ -172,7 +172,7 @@ bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
     Index best = kNoIndex;
     double best_score = 0;
     for (Index c : solid.cells_around(p)) {
-      if (c == kNoIndex || !solid.may_flip(c) || flips[c] >= kMostFlips) continue;
+      if (c == kNoIndex || !solid.may_flip(c) || flips[c] >= kMostVoxelFlips) continue;
       const double score = solid.good_gain(c) + goal.gain(solid, c);
       if (best == kNoIndex || score > best_score) best = c, best_score = score;
     }
@@ -214,10 +214,10 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
   const BettiNumbers now = solid.topology();
   if (now.components != goal.topology.components || now.cavities != goal.topology.cavities) return false;
   // Many wrong handles mean that the grid is too coarse; correcting them one by one would not give a good likeness.
-  constexpr int kMostFlips = 24;
+  constexpr int kMostWrongHandles = 24;
   const int missing = goal.topology.handles - now.handles;
   if (missing == 0) return true;
-  if (std::abs(missing) > kMostFlips) return false;
+  if (std::abs(missing) > kMostWrongHandles) return false;
   LoopLengths loops(solid.num_cells());
   std::array<Index, 26> around{};
   for (int i = 0; i < std::abs(missing); ++i) {
@@ -239,25 +239,25 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
 
 void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
   constexpr double kLeastFraction = 0.02;  // of a cell; less does not belong to a part that must be reached
-  // Steps from the solid that are near enough, and rounds: one part that is reached may lead to the next.
-  constexpr int kNear = 2, kRounds = 3;
+  // Fewer steps from the solid are near enough. Rounds: one part that is reached may lead to the next.
+  constexpr int kLeastFarSteps = 2, kThinPartRounds = 3;
   std::vector<char> given_up(solid.num_cells(), 0);
   std::vector<Index> previous, path, far;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kThinPartRounds; ++round) {
     const std::vector<int> steps = voxel_steps(
         solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; },
         &previous, goal.stop);
     if (goal.is_stopped()) return;
     far.clear();
     for (std::size_t c = 0; c < steps.size(); ++c)
-      if (steps[c] >= kNear && !given_up[c]) far.push_back(static_cast<Index>(c));
+      if (steps[c] >= kLeastFarSteps && !given_up[c]) far.push_back(static_cast<Index>(c));
     if (far.empty()) return;
     std::stable_sort(far.begin(), far.end(), [&](Index a, Index b) { return steps[a] > steps[b]; });
     for (Index end : far) {
       if (goal.is_stopped()) return;
       path.clear();
       for (Index c = end; !solid.filled(c); c = previous[c]) path.push_back(c);
-      if (path.size() < static_cast<std::size_t>(kNear)) continue;
+      if (path.size() < static_cast<std::size_t>(kLeastFarSteps)) continue;
       given_up[end] = 1;
       for (; !path.empty() && solid.may_flip(path.back()) && solid.is_simple(path.back()); path.pop_back())
         solid.flip(path.back());

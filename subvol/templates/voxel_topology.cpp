@@ -99,14 +99,14 @@ constexpr Elements make_elements() {
   return e;
 }
 
-constexpr Elements kCube = make_elements();
+constexpr Elements kCubeElements = make_elements();
 
 /// Returns the part of a set that is connected with its lowest element.
 std::uint32_t first_part(std::uint32_t elements) {
   std::uint32_t part = elements & (~elements + 1), front = part;
   while (front) {
     std::uint32_t next = 0;
-    for (; front; front &= front - 1) next |= kCube.touching[std::countr_zero(front)];
+    for (; front; front &= front - 1) next |= kCubeElements.touching[std::countr_zero(front)];
     front = next & elements & ~part;
     part |= front;
   }
@@ -209,11 +209,11 @@ VoxelSolid::Contact VoxelSolid::contact_of(std::uint32_t neighbors) {
   Contact k;
   for (int e = 0, n = 0; e < kElements; ++e) {
     if (e == 13) continue;
-    if (neighbors >> n++ & 1) k.shared |= kCube.closure[e];
+    if (neighbors >> n++ & 1) k.shared |= kCubeElements.closure[e];
   }
-  k.open = kCube.all & ~k.shared;
-  k.euler_number = std::popcount(k.shared & kCube.vertices) - std::popcount(k.shared & kCube.edges) +
-                   std::popcount(k.shared & kCube.faces);
+  k.open = kCubeElements.all & ~k.shared;
+  k.euler_number = std::popcount(k.shared & kCubeElements.vertices) - std::popcount(k.shared & kCubeElements.edges) +
+                   std::popcount(k.shared & kCubeElements.faces);
   for (std::uint32_t rest = k.shared; rest; rest &= ~first_part(rest)) ++k.components;
   return k;
 }

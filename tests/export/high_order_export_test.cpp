@@ -30,7 +30,7 @@ HighOrderMesh bent(const VolumeMesh& straight, Basis basis, int order, double am
   });
 }
 
-double patch_share(int t) { return static_cast<double>(t) / PatchSurface::kUnits; }
+double patch_share(int t) { return static_cast<double>(t) / PatchSurface::kPatchSideUnits; }
 
 bool is_closed(const TriangleMesh& mesh) {
   std::map<std::array<Index, 2>, int> balance;
@@ -49,7 +49,7 @@ TEST_CASE("patches lie on the curved boundary and have its normals") {
     const HighOrderMesh mesh = bent(mixed_cells(), basis, 4);
     const MeshTopology& topology = mesh.space.topology();
     const HighOrderPatches patches(mesh, 30);
-    const std::vector<int> t{0, PatchSurface::kUnits / 4, PatchSurface::kUnits};
+    const std::vector<int> t{0, PatchSurface::kPatchSideUnits / 4, PatchSurface::kPatchSideUnits};
     std::vector<Vec3> positions(9), normals(9);
     for (std::size_t p = 0; p < patches.num_patches(); ++p) {
       patches.evaluate(static_cast<Index>(p), t, t, positions.data(), normals.data());

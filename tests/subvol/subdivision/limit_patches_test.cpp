@@ -36,7 +36,7 @@ void descend(std::size_t quad, int levels, const std::array<Place, 4>& corners, 
 
 std::vector<int> uniform_parameters(int depth) {
   std::vector<int> t;
-  for (int i = 0; i <= 1 << depth; ++i) t.push_back(i * (LimitPatches::kUnits >> depth));
+  for (int i = 0; i <= 1 << depth; ++i) t.push_back(i * (LimitPatches::kPatchSideUnits >> depth));
   return t;
 }
 
@@ -111,7 +111,7 @@ TEST_CASE("a patch is continued by its neighbor at the same parameter of their c
   LimitPatches patches(creased(mixed_cells(), 1.3));
   patches.prepare(3);
   const SurfaceTopology& quads = patches.quads();
-  const std::vector<int> t = uniform_parameters(3), low = {0}, high = {LimitPatches::kUnits};
+  const std::vector<int> t = uniform_parameters(3), low = {0}, high = {LimitPatches::kPatchSideUnits};
   const auto side = [&](Index h) {
     std::vector<Vec3> points(t.size());
     const bool along_u = h % 2 == 0;
@@ -128,7 +128,7 @@ TEST_CASE("a patch is continued by its neighbor at the same parameter of their c
 TEST_CASE("depth needs no more than what is irregular: a deep sample equals the limit of its corner") {
   const VolumeMesh cage = creased(l_shape(2));
   LimitPatches patches(cage);
-  patches.prepare(LimitPatches::kMaxDepth);
+  patches.prepare(LimitPatches::kMostPatchDepth);
   const std::vector<Vec3> limit = limit_map(cage).apply(cage.positions);
   const MeshTopology topology(cage);
   const std::vector<int> ends = {0, 1};
