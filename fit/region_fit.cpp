@@ -201,7 +201,7 @@ void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& to
   };
   boundary.group_of_face.assign(topology.num_faces(), 0);
   for (const Index f : topology.boundary_faces())
-    boundary.group_of_face[f] = key_of({kOutside, mesh_.references[topology.face_cells(f)[0]]});
+    boundary.group_of_face[f] = key_of({kOutsideRegion, mesh_.references[topology.face_cells(f)[0]]});
   const Interfaces interfaces = find_interfaces(mesh_, topology);
   for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
     boundary.group_of_face[interfaces.faces[i]] = key_of(interfaces.pairs[interfaces.pair_of_face[i]]);

@@ -91,10 +91,10 @@ RegionFaces faces_of_region(const PolygonMesh& surface, const RegionSurface& reg
     const bool is_taken = std::exchange(found.is_taken, true);
     if (std::exchange(is_seen[face], 1)) continue;  // the first triangle with an area decides
     const auto& [behind, front] = regions.sides[found.triangle];
-    const bool bounds = region == kOutside ? front == kOutside : behind == region || front == region;
+    const bool bounds = region == kOutsideRegion ? front == kOutsideRegion : behind == region || front == region;
     if (!bounds || is_taken) continue;
     result.is_left_out[face] = 0;
-    const bool is_outward = region == kOutside || behind == region;  // the triangle of the regions
+    const bool is_outward = region == kOutsideRegion || behind == region;  // the triangle of the regions
     if (is_outward == (is_turned == found.is_turned)) continue;
     const auto first = result.surface.face_vertices.begin();
     std::reverse(first + static_cast<std::ptrdiff_t>(surface.face_offsets[face]) + 1,

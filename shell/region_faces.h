@@ -19,7 +19,7 @@ struct RegionFaces {
 /// Selects the faces that bound a region and turns those whose normals point into it.
 ///
 /// regions  those of the surface's triangles (`find_regions` of `triangulate(surface)`).
-/// region   the number of one of them; kOutside: the faces between any region and the outside, oriented outward.
+/// region   the number of one of them; kOutsideRegion: the faces between any region and the outside, oriented outward.
 /// returns  faces without an area are left out. Of two faces in one place, as solids that share a face have, the second
 ///          is left out, and vertices at one position are joined where the first has those of the other solid.
 /// Cost: a search in a sorted list for each triangle.

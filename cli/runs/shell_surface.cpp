@@ -85,14 +85,14 @@ void select_region(const ShellSurfaceOptions& options, ShellSurface& result) {
   if (options.region.empty() && !has_inner_sheets(result.polygons)) return;
   const std::optional<RegionSurface> regions = find_regions(triangulate(result.polygons));
   if (!regions && options.region.empty()) return;  // the mending says what is wrong
-  const int number = options.region.empty() ? kOutside
+  const int number = options.region.empty() ? kOutsideRegion
                                             : number_of_region(regions ? regions->regions : std::vector<Group>{},
                                                                options.region, "--region");
-  if (number == kOutside && options.side != ShellSide::outward)
+  if (number == kOutsideRegion && options.side != ShellSide::outward)
     throw InputError("sheets divide the inside of the surface into " + std::to_string(regions->regions.size()) +
                      " regions, and layers inward would cross them; give --region NAME to grow them in one");
   RegionFaces faces = faces_of_region(result.polygons, *regions, number);
-  if (number == kOutside && faces.num_left_out > 0)
+  if (number == kOutsideRegion && faces.num_left_out > 0)
     result.note = std::to_string(faces.num_left_out) + " faces between its " + std::to_string(regions->regions.size()) +
                   " regions get no layers; with --region NAME, layers grow on the boundary of one region";
   PartialSurface part = without_faces(faces.surface, result.tags, faces.is_left_out);

@@ -20,7 +20,7 @@ namespace subvol::internal {
 
 namespace {
 
-/// The faces of a mesh's sheets, and the pair of regions on either side of each; kOutside at the boundary.
+/// The faces of a mesh's sheets, and the pair of regions on either side of each; kOutsideRegion at the boundary.
 struct SheetFaces {
   std::vector<Index> faces;
   std::vector<std::array<int, 2>> pairs;
@@ -30,7 +30,7 @@ SheetFaces sheet_faces(const VolumeMesh& mesh, const MeshTopology& topology) {
   SheetFaces sheets;
   for (const Index f : topology.boundary_faces()) {
     sheets.faces.push_back(f);
-    sheets.pairs.push_back({kOutside, mesh.references[topology.face_cells(f)[0]]});
+    sheets.pairs.push_back({kOutsideRegion, mesh.references[topology.face_cells(f)[0]]});
   }
   const Interfaces interfaces = find_interfaces(mesh, topology);
   for (std::size_t i = 0; i < interfaces.faces.size(); ++i) {

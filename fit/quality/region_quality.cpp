@@ -261,11 +261,12 @@ RegionReport measure_regions(const RegionSurface& surface) {
   for (std::size_t r = 0; r < surface.regions.size(); ++r) {
     RegionQuality region{surface.regions[r].number, surface.regions[r].name};
     region.volume = surface.volumes[r];
-    if (const auto at = areas.find({kOutside, region.reference}); at != areas.end()) region.area = at->second.area;
+    if (const auto at = areas.find({kOutsideRegion, region.reference}); at != areas.end())
+      region.area = at->second.area;
     report.regions.push_back(std::move(region));
   }
   for (auto& [pair, area] : areas) {
-    if (pair[0] == kOutside) continue;
+    if (pair[0] == kOutsideRegion) continue;
     area.references = pair;
     report.interfaces.push_back(area);
   }

@@ -84,7 +84,7 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
   }
   std::map<int, int> reference_of = one_to_one(votes);
   if (reference_of.size() != references.size()) return std::nullopt;
-  reference_of[kOutside] = kOutside;
+  reference_of[kOutsideRegion] = kOutsideRegion;
   for (auto& sides : regions->sides)
     for (int& side : sides) side = reference_of[side];
   for (Group& region : regions->regions) region.number = reference_of[region.number];
@@ -92,7 +92,7 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
   orient_sheets(*regions);
   std::vector<std::array<int, 2>> inner;
   for (const auto& pair : region_pairs(*regions))
-    if (pair[0] != kOutside) inner.push_back(pair);
+    if (pair[0] != kOutsideRegion) inner.push_back(pair);
   if (find_interfaces(mesh, MeshTopology(mesh)).pairs != inner) return std::nullopt;
   return regions;
 }

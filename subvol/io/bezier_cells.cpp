@@ -17,7 +17,7 @@ namespace subvol::internal {
 namespace {
 
 /// Largest difference between the places that two cells give a common node, as a share of a cell's extent.
-constexpr double kMostGap = 1e-6;
+constexpr double kMostBezierNodeGap = 1e-6;
 
 /// Exponents of the Bernstein polynomials of a simplex with up to three axes, without that of its first corner.
 std::vector<LatticePoint> simplex_lattice(std::size_t num_axes, int order) {
@@ -163,7 +163,7 @@ void control_points_to_nodes(NodalMesh& mesh, std::span<const std::size_t> bezie
       if (cell_of[node] == kNoIndex) {
         cell_of[node] = static_cast<Index>(c);
         result[node] = place;
-      } else if (!((place - result[node]).norm() <= kMostGap * extent)) {
+      } else if (!((place - result[node]).norm() <= kMostBezierNodeGap * extent)) {
         throw InputError("cells " + std::to_string(cell_of[node]) + " and " + std::to_string(c) + " share point " +
                          std::to_string(node) + ", but not the edge or face that it lies on");
       }

@@ -16,7 +16,10 @@ namespace {
 class ClassicHeader {
  public:
   ClassicHeader(const std::string& name, std::string_view bytes)
-      : name_(name), rest_(bytes.substr(kMagic)), version_(bytes[kMagic - 1]), count_size_(version_ == 5 ? 8 : 4) {}
+      : name_(name),
+        rest_(bytes.substr(kNetcdfMagicBytes)),
+        version_(bytes[kNetcdfMagicBytes - 1]),
+        count_size_(version_ == 5 ? 8 : 4) {}
 
   void walk() {
     skip(count_size_);  // records
@@ -28,7 +31,7 @@ class ClassicHeader {
     for (std::uint64_t left = list(kVariable); left > 0; --left) skip_variable();
   }
 
-  static constexpr std::size_t kMagic = 4;
+  static constexpr std::size_t kNetcdfMagicBytes = 4;
 
  private:
   static constexpr std::uint64_t kDimension = 10, kVariable = 11, kAttribute = 12;
@@ -70,10 +73,10 @@ class ClassicHeader {
   }
   /// Reads a type, and returns the size of its values.
   std::size_t size_of_type() {
-    constexpr std::array<std::size_t, 12> kSizes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // by type
+    constexpr std::array<std::size_t, 12> kNetcdfValueSizes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // by type
     const std::uint64_t type = number(4);
-    if (type == 0 || type >= kSizes.size()) fail("has an unknown type");
-    return kSizes[type];
+    if (type == 0 || type >= kNetcdfValueSizes.size()) fail("has an unknown type");
+    return kNetcdfValueSizes[type];
   }
 
   /// The dimension of length 0, which is that of the records, may only be a variable's first one.
@@ -102,8 +105,8 @@ class ClassicHeader {
 }  // namespace
 
 void require_sound_netcdf_header(const std::string& name, std::string_view bytes) {
-  if (bytes.size() < ClassicHeader::kMagic || !bytes.starts_with("CDF")) return;
-  const char version = bytes[ClassicHeader::kMagic - 1];
+  if (bytes.size() < ClassicHeader::kNetcdfMagicBytes || !bytes.starts_with("CDF")) return;
+  const char version = bytes[ClassicHeader::kNetcdfMagicBytes - 1];
   if (version == 1 || version == 2 || version == 5) ClassicHeader(name, bytes).walk();
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 /// An element of FBX: a key with values, which may hold further elements. Only the first values are kept.
 struct FbxElement {
-  static constexpr std::size_t kMostValues = 4;
+  static constexpr std::size_t kMostFbxValues = 4;
   std::string_view key;
   std::vector<std::string_view> values;  ///< texts without quotes, numbers in decimal
 };
@@ -75,7 +75,7 @@ void visit_fbx_text(std::string_view text, FbxModels& models) {
   std::string_view word;  // may be a key or a value
   std::size_t depth = 0;
   const auto end_word = [&] {
-    if (!word.empty() && element.values.size() < FbxElement::kMostValues) element.values.push_back(word);
+    if (!word.empty() && element.values.size() < FbxElement::kMostFbxValues) element.values.push_back(word);
     word = {};
   };
   const auto end_element = [&] {
@@ -90,7 +90,8 @@ void visit_fbx_text(std::string_view text, FbxModels& models) {
     } else if (c == '"') {
       end_word();
       end = std::min(text.find('"', at + 1), text.size());
-      if (element.values.size() < FbxElement::kMostValues) element.values.push_back(text.substr(at + 1, end - at - 1));
+      if (element.values.size() < FbxElement::kMostFbxValues)
+        element.values.push_back(text.substr(at + 1, end - at - 1));
       ++end;
     } else if (c == ':') {
       const std::string_view key = std::exchange(word, {});
@@ -120,14 +121,14 @@ class FbxBinary {
  public:
   FbxBinary(std::string_view bytes, FbxModels& models) : bytes_(bytes), models_(models) {}
 
-  static constexpr std::string_view kMagic = "Kaydara FBX Binary";
+  static constexpr std::string_view kFbxMagic = "Kaydara FBX Binary";
 
   void visit() {
-    constexpr std::size_t kVersionAt = 23, kHeader = 27;
+    constexpr std::size_t kFbxVersionAt = 23, kFbxHeaderBytes = 27;
     constexpr std::uint64_t kFirstOf64 = 7500;  // version whose places and counts have 64 bits
-    if (bytes_.size() < kHeader) return;
-    word_size_ = number_at(kVersionAt, 4) >= kFirstOf64 ? 8 : 4;
-    at_ = kHeader;
+    if (bytes_.size() < kFbxHeaderBytes) return;
+    word_size_ = number_at(kFbxVersionAt, 4) >= kFirstOf64 ? 8 : 4;
+    at_ = kFbxHeaderBytes;
     std::vector<std::size_t> ends;  // of the elements that are open
     while (visit_element(ends)) models_.require_depth(ends.size());
   }
@@ -164,21 +165,21 @@ class FbxBinary {
 
   /// Returns the first values, up to one that is neither a text nor a number of 64 bits.
   std::vector<std::string_view> values_of(std::string_view rest) {
-    constexpr std::size_t kLength = 4, kNumber = 8;
+    constexpr std::size_t kFbxLengthBytes = 4, kFbxNumberBytes = 8;
     std::vector<std::string_view> values;
     texts_.clear();
-    while (!rest.empty() && values.size() < FbxElement::kMostValues) {
+    while (!rest.empty() && values.size() < FbxElement::kMostFbxValues) {
       const char type = rest[0];
       rest.remove_prefix(1);
       const auto at = static_cast<std::size_t>(rest.data() - bytes_.data());
-      if (type == 'S' && rest.size() >= kLength) {
-        const std::size_t length = static_cast<std::size_t>(number_at(at, kLength));
-        if (length > rest.size() - kLength) break;
-        values.push_back(rest.substr(kLength, length));
-        rest.remove_prefix(kLength + length);
-      } else if (type == 'L' && rest.size() >= kNumber) {
-        values.push_back(texts_.emplace_back(std::to_string(number_at(at, kNumber))));
-        rest.remove_prefix(kNumber);
+      if (type == 'S' && rest.size() >= kFbxLengthBytes) {
+        const std::size_t length = static_cast<std::size_t>(number_at(at, kFbxLengthBytes));
+        if (length > rest.size() - kFbxLengthBytes) break;
+        values.push_back(rest.substr(kFbxLengthBytes, length));
+        rest.remove_prefix(kFbxLengthBytes + length);
+      } else if (type == 'L' && rest.size() >= kFbxNumberBytes) {
+        values.push_back(texts_.emplace_back(std::to_string(number_at(at, kFbxNumberBytes))));
+        rest.remove_prefix(kFbxNumberBytes);
       } else {
         break;
       }
@@ -196,7 +197,7 @@ class FbxBinary {
 
 void require_sound_fbx(const std::string& name, std::string_view bytes) {
   FbxModels models(name);
-  if (bytes.starts_with(FbxBinary::kMagic))
+  if (bytes.starts_with(FbxBinary::kFbxMagic))
     FbxBinary(bytes, models).visit();
   else
     visit_fbx_text(bytes, models);

@@ -14,10 +14,10 @@ void fail_at(const FilePlace& place, const std::string& what) {
 }
 
 IncludedFiles::File IncludedFiles::read(const FilePlace& place, std::string input, int depth) {
-  constexpr int kMostDepth = 8, kMostFiles = 256;  // beyond any model; a file may include itself
-  if (depth > kMostDepth || ++num_files_ > kMostFiles)
-    fail_at(place, "more than " + std::to_string(kMostDepth) + " files in one another, or more than " +
-                       std::to_string(kMostFiles) + " in all");
+  constexpr int kMostIncludeDepth = 8, kMostIncludedFiles = 256;  // beyond any model; a file may include itself
+  if (depth > kMostIncludeDepth || ++num_files_ > kMostIncludedFiles)
+    fail_at(place, "more than " + std::to_string(kMostIncludeDepth) + " files in one another, or more than " +
+                       std::to_string(kMostIncludedFiles) + " in all");
   std::replace(input.begin(), input.end(), '\\', '/');
   namespace fs = std::filesystem;
   fs::path path = fs::path(*place.file).parent_path() / input;

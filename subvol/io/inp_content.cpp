@@ -50,8 +50,8 @@ class InpMesh {
   }
 
  private:
-  static constexpr std::size_t kNone = InpSets::kNone;
-  static constexpr std::size_t kMostFaces = 1u << 26;  ///< in groups: sets of sets could double with every line
+  static constexpr std::size_t kNoElementSet = InpSets::kNoInpSet;
+  static constexpr std::size_t kMostInpGroupFaces = 1u << 26;  ///< sets of sets could double with every line
 
   [[noreturn]] void fail(const std::string& what) const { fail_at(place_, what); }
 
@@ -64,7 +64,7 @@ class InpMesh {
       place_ = shell.place;
       for (; begin < shell.end; ++begin) mesh_.shells.face_vertices.push_back(node_of(content_.shell_nodes[begin]));
       mesh_.shells.face_offsets.push_back(mesh_.shells.face_vertices.size());
-      of_face.push_back(shell.set == kNone ? kNoIndex : groups.by_name(content_.element_sets.name(shell.set)));
+      of_face.push_back(shell.set == kNoElementSet ? kNoIndex : groups.by_name(content_.element_sets.name(shell.set)));
     }
     if (groups.groups().size() + (std::find(of_face.begin(), of_face.end(), kNoIndex) != of_face.end()) > 1)
       mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
@@ -94,15 +94,15 @@ class InpMesh {
   /// C3D27 has the middles of the faces S1 to S6 after that of the cell, which has been moved to the end; VTK has them
   /// by coordinates.
   static void order_faces(std::vector<Index>& nodes) {
-    constexpr std::size_t kFaces[] = {5, 3, 2, 4, 0, 1};  // -x +x -y +y -z +z
+    constexpr std::size_t kInpFaceOfVtk[] = {5, 3, 2, 4, 0, 1};  // -x +x -y +y -z +z
     const std::vector<Index> old(nodes.begin() + 20, nodes.end());
-    for (std::size_t f = 0; f < 6; ++f) nodes[20 + f] = old[kFaces[f]];
+    for (std::size_t f = 0; f < 6; ++f) nodes[20 + f] = old[kInpFaceOfVtk[f]];
   }
 
   void add_sides() {
     for (const InpContent::Side& side : content_.sides) {
       place_ = side.place;
-      if (side.set == kNone) {
+      if (side.set == kNoElementSet) {
         const auto found = content_.elements_by_label.find(side.element);
         if (found != content_.elements_by_label.end()) add_side(side, found->second);  // else one that is skipped
         continue;
@@ -110,7 +110,7 @@ class InpMesh {
       if (!content_.element_sets.is_defined(side.set))
         fail("*SURFACE: there is no element set " + in_quotes(content_.element_sets.name(side.set)));
       for (const Index element : content_.element_sets.members(side.set)) add_side(side, element);
-      if (mesh_.face_groups.faces.size() > kMostFaces) fail("*SURFACE: too many faces");
+      if (mesh_.face_groups.faces.size() > kMostInpGroupFaces) fail("*SURFACE: too many faces");
     }
   }
 
@@ -145,7 +145,7 @@ class InpMesh {
       }
       const Index group = content_.faces.by_name(content_.node_sets.name(s));
       for (const std::span<const Index> face : faces) add_face(mesh_, face, group);
-      if (mesh_.face_groups.faces.size() > kMostFaces) fail("*NSET: too many faces");
+      if (mesh_.face_groups.faces.size() > kMostInpGroupFaces) fail("*NSET: too many faces");
     }
   }
 
@@ -180,7 +180,7 @@ class InpMesh {
     if (!sets.empty()) return sets;
     std::set<std::size_t> of_elements;
     for (const InpContent::Element& element : content_.elements)
-      if (element.set != kNone) of_elements.insert(element.set);
+      if (element.set != kNoElementSet) of_elements.insert(element.set);
     return {of_elements.begin(), of_elements.end()};
   }
 
@@ -195,7 +195,7 @@ class InpMesh {
     std::set<std::size_t> used = materials;
     std::map<std::size_t, std::vector<std::size_t>> sets_of_one;  // that hold nothing but the set
     for (std::size_t s = 0; s < content_.element_sets.size(); ++s)
-      if (const std::size_t other = content_.element_sets.only_other(s); other != kNone)
+      if (const std::size_t other = content_.element_sets.only_other(s); other != kNoElementSet)
         sets_of_one[other].push_back(s);
     mesh_.references.assign(content_.elements.size(), 0);
     int next = 1;
@@ -210,18 +210,18 @@ class InpMesh {
       else
         name_region(reference, sets_of_one[s], used);
     }
-    if (const std::size_t all = set_of_all_elements(); all != kNone) used.insert(all);  // it says nothing
+    if (const std::size_t all = set_of_all_elements(); all != kNoElementSet) used.insert(all);  // it says nothing
     std::size_t defined = 0;
     for (std::size_t s = 0; s < content_.element_sets.size(); ++s) defined += content_.element_sets.is_defined(s);
     content_.left_out.add("element sets", defined - std::min(defined, used.size()));
   }
 
-  /// The set that every *ELEMENT names; kNone if there is none.
+  /// The set that every *ELEMENT names; kNoElementSet if there is none.
   std::size_t set_of_all_elements() const {
-    const std::size_t first = content_.elements.empty() ? kNone : content_.elements.front().set;
+    const std::size_t first = content_.elements.empty() ? kNoElementSet : content_.elements.front().set;
     const bool is_of_all = std::ranges::all_of(
         content_.elements, [&](const InpContent::Element& element) { return element.set == first; });
-    return is_of_all && first != kNone && content_.element_sets.is_defined(first) ? first : kNone;
+    return is_of_all && first != kNoElementSet && content_.element_sets.is_defined(first) ? first : kNoElementSet;
   }
 
   /// A set that holds nothing but the set of one of our references has its name.

@@ -32,7 +32,7 @@ struct InpContent {
   struct Element {
     const InpType* type;
     std::size_t first_node, num_nodes;
-    std::size_t set;  ///< of *ELEMENT, ELSET=; InpSets::kNone if it has none
+    std::size_t set;  ///< of *ELEMENT, ELSET=; InpSets::kNoInpSet if it has none
     FilePlace place;
   };
   struct Shell {
@@ -41,7 +41,7 @@ struct InpContent {
     FilePlace place;
   };
   struct Side {
-    std::int64_t element;  ///< its number, if `set` is InpSets::kNone
+    std::int64_t element;  ///< its number, if `set` is InpSets::kNoInpSet
     std::size_t set;
     int number;     ///< of the face
     Index surface;  ///< place in the list of groups

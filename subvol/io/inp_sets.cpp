@@ -32,12 +32,12 @@ std::size_t InpSets::defined(const std::string& name, const InpInstance* instanc
 
 std::size_t InpSets::find(const std::string& name) const {
   const auto found = numbers_.find(upper_case(name));
-  return found == numbers_.end() ? kNone : found->second;
+  return found == numbers_.end() ? kNoInpSet : found->second;
 }
 
 void InpSets::add_range(std::size_t set, std::int64_t first, std::int64_t last, std::int64_t step,
                         const FilePlace& place) {
-  sets_[set].items.push_back({first, last, step, kNone, place});
+  sets_[set].items.push_back({first, last, step, kNoInpSet, place});
 }
 
 void InpSets::add_set(std::size_t set, std::size_t other, const FilePlace& place) {
@@ -63,21 +63,21 @@ void InpSets::close(const FilePlace& place) {
 
 std::size_t InpSets::only_other(std::size_t set) const {
   const std::vector<Item>& items = sets_[set].items;
-  return items.size() == 1 ? items[0].other : kNone;
+  return items.size() == 1 ? items[0].other : kNoInpSet;
 }
 
 /// The work is bounded: sets of sets could double with every line.
 const std::vector<Index>& InpSets::members(std::size_t s, int depth) {
-  constexpr std::size_t kMostWork = 1u << 28;
-  constexpr int kMostDepth = 64;
+  constexpr std::size_t kMostVisitedInpMembers = 1u << 28;
+  constexpr int kMostInpSetDepth = 64;
   if (sets_[s].is_resolved) return sets_[s].members;
-  if (!sets_[s].items.empty() && (sets_[s].is_open || depth > kMostDepth))
+  if (!sets_[s].items.empty() && (sets_[s].is_open || depth > kMostInpSetDepth))
     fail_at(sets_[s].items[0].place, std::string(keyword_) + ": the set " + in_quotes(sets_[s].name) +
                                          " includes itself, or is nested too deeply");
   sets_[s].is_open = true;
   std::vector<Index> members;
   for (const Item& item : sets_[s].items) {
-    if (item.other != kNone) {
+    if (item.other != kNoInpSet) {
       if (!sets_[item.other].is_defined)
         fail_at(item.place, std::string(keyword_) + ": there is no set " + in_quotes(sets_[item.other].name));
       const std::vector<Index>& others = this->members(item.other, depth + 1);
@@ -86,7 +86,7 @@ const std::vector<Index>& InpSets::members(std::size_t s, int depth) {
     } else {
       append_range(item, members);
     }
-    if (work_ > kMostWork) fail_at(item.place, std::string(keyword_) + ": sets with too many members");
+    if (work_ > kMostVisitedInpMembers) fail_at(item.place, std::string(keyword_) + ": sets with too many members");
   }
   sort_unique(members);
   Set& set = sets_[s];

@@ -20,7 +20,7 @@ namespace subvol::internal {
 /// Sets of an instance are named INSTANCE.SET in the assembly.
 class InpSets {
  public:
-  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  static constexpr std::size_t kNoInpSet = static_cast<std::size_t>(-1);
 
   /// keyword  for messages. by_number: place of each node or element by its number, known when members are asked for.
   InpSets(const char* keyword, const std::unordered_map<std::int64_t, Index>& by_number)
@@ -30,7 +30,7 @@ class InpSets {
   /// Returns the place of a set, which may still have to be defined. instance: to which it belongs; may be null.
   std::size_t named(const std::string& name, const InpInstance* instance);
   std::size_t defined(const std::string& name, const InpInstance* instance);
-  /// Returns the place of a set by its name in the assembly; kNone: there is none.
+  /// Returns the place of a set by its name in the assembly; kNoInpSet: there is none.
   std::size_t find(const std::string& name) const;
 
   /// Add every step-th number of a range, or the members of another set.
@@ -43,7 +43,7 @@ class InpSets {
   bool is_defined(std::size_t set) const { return sets_[set].is_defined; }
   /// The name for people: without the instance if no other set has it.
   const std::string& name(std::size_t set) const { return sets_[set].name; }
-  /// If the set consists of nothing but another one, returns it; else kNone.
+  /// If the set consists of nothing but another one, returns it; else kNoInpSet.
   std::size_t only_other(std::size_t set) const;
   /// Returns the places of its members, ascending. InputError: a set that is not defined, includes itself, or is too
   /// large.

@@ -36,7 +36,7 @@ class FileText {
 
 /// Inflates gzip data to at most so many bytes.
 std::string inflated(std::string_view data, std::size_t most, const FileText& file) {
-  constexpr std::size_t kChunk = 1 << 20;
+  constexpr std::size_t kInflateChunkBytes = 1 << 20;
   constexpr int kGzip = 16;  // added to the window size: a gzip header is expected
   z_stream stream{};
   if (inflateInit2(&stream, MAX_WBITS + kGzip) != Z_OK) file.fail("memory is short for decompression");
@@ -51,11 +51,11 @@ std::string inflated(std::string_view data, std::size_t most, const FileText& fi
       taken += size;
     }
     const std::size_t before = result.size();
-    result.resize(before + kChunk);
+    result.resize(before + kInflateChunkBytes);
     stream.next_out = reinterpret_cast<Bytef*>(result.data() + before);
-    stream.avail_out = static_cast<uInt>(kChunk);
+    stream.avail_out = static_cast<uInt>(kInflateChunkBytes);
     status = inflate(&stream, Z_NO_FLUSH);
-    result.resize(before + kChunk - stream.avail_out);
+    result.resize(before + kInflateChunkBytes - stream.avail_out);
     if (status == Z_BUF_ERROR && stream.avail_in == 0 && taken == data.size()) break;
     if (status == Z_BUF_ERROR) status = Z_OK;
   }
@@ -132,15 +132,15 @@ void require_sound_axes(const LabelGrid& grid, const FileText& file) {
 
 /// Returns the numbers at the start of a text, separated by spaces, commas and parentheses.
 std::vector<double> numbers_in(std::string_view text) {
-  constexpr std::string_view kBetween = " \t\r\n(),";
+  constexpr std::string_view kNumberSeparators = " \t\r\n(),";
   std::vector<double> numbers;
-  for (std::size_t at = text.find_first_not_of(kBetween); at != std::string_view::npos;) {
-    const std::size_t end = std::min(text.find_first_of(kBetween, at), text.size());
+  for (std::size_t at = text.find_first_not_of(kNumberSeparators); at != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kNumberSeparators, at), text.size());
     double number = 0;
     const auto [last, error] = std::from_chars(text.data() + at, text.data() + end, number);
     if (error != std::errc() || last != text.data() + end) break;
     numbers.push_back(number);
-    at = text.find_first_not_of(kBetween, end);
+    at = text.find_first_not_of(kNumberSeparators, end);
   }
   return numbers;
 }
@@ -172,12 +172,13 @@ ValueType numpy_type(const std::string& text, std::endian& order, const FileText
 }
 
 LabelGrid read_numpy(const std::string& bytes, const FileText& file) {
-  constexpr std::size_t kVersion = 6, kLength = 8;
-  if (!bytes.starts_with("\x93NUMPY") || bytes.size() < kLength + 4) file.fail("it does not start as a .npy file does");
-  const bool is_long = bytes[kVersion] >= 2;
-  const auto length = static_cast<std::size_t>(decode(bytes.data() + kLength, is_long ? kUInt32 : kUInt16,
-                                                      std::endian::little));
-  const std::size_t begin = kLength + (is_long ? 4 : 2);
+  constexpr std::size_t kNumpyVersionAt = 6, kNumpyLengthAt = 8;
+  if (!bytes.starts_with("\x93NUMPY") || bytes.size() < kNumpyLengthAt + 4)
+    file.fail("it does not start as a .npy file does");
+  const bool is_long = bytes[kNumpyVersionAt] >= 2;
+  const auto length =
+      static_cast<std::size_t>(decode(bytes.data() + kNumpyLengthAt, is_long ? kUInt32 : kUInt16, std::endian::little));
+  const std::size_t begin = kNumpyLengthAt + (is_long ? 4 : 2);
   if (length > bytes.size() - begin) file.fail("it ends within its header");
   const std::string header = bytes.substr(begin, length);
   std::endian order = std::endian::little;
@@ -305,52 +306,53 @@ LabelGrid read_nrrd(const std::string& bytes, const FileText& file) {
 // NIfTI
 
 LabelGrid read_nifti(const std::string& bytes, const FileText& file) {
-  // Places in the header of NIfTI-1.
-  constexpr std::size_t kHeader = 348, kDim = 40, kType = 70, kPixdim = 76, kOffset = 108, kSlope = 112,
-                        kIntercept = 116, kQform = 252, kSform = 254, kQuaternion = 256, kQoffset = 268, kRows = 280,
-                        kMagic = 344;
-  if (bytes.size() < kHeader + 4) file.fail("it is shorter than a NIfTI-1 header");
+  // The size of the header of NIfTI-1, and places in it.
+  constexpr std::size_t kNiftiHeaderBytes = 348, kNiftiDimAt = 40, kNiftiTypeAt = 70, kNiftiPixdimAt = 76,
+                        kNiftiVoxelOffsetAt = 108, kNiftiSlopeAt = 112, kNiftiInterceptAt = 116, kNiftiQformAt = 252,
+                        kNiftiSformAt = 254, kNiftiQuaternionAt = 256, kNiftiQoffsetAt = 268, kNiftiRowsAt = 280,
+                        kNiftiMagicAt = 344;
+  if (bytes.size() < kNiftiHeaderBytes + 4) file.fail("it is shorter than a NIfTI-1 header");
   std::endian order = std::endian::little;
-  if (decode(bytes.data(), kInt32, order) != kHeader) order = std::endian::big;
-  if (decode(bytes.data(), kInt32, order) != kHeader || bytes.compare(kMagic, 3, "n+1") != 0)
+  if (decode(bytes.data(), kInt32, order) != kNiftiHeaderBytes) order = std::endian::big;
+  if (decode(bytes.data(), kInt32, order) != kNiftiHeaderBytes || bytes.compare(kNiftiMagicAt, 3, "n+1") != 0)
     file.fail("it does not start as a NIfTI-1 file with its volume does");
   const auto number = [&](std::size_t at, ValueType type) { return decode(bytes.data() + at, type, order); };
   static const std::map<int, ValueType> kTypes{{2, kUInt8},    {4, kInt16},    {8, kInt32},    {16, kFloat32},
                                                {64, kFloat64}, {256, kInt8},   {512, kUInt16}, {768, kUInt32},
                                                {1024, kInt64}, {1280, kUInt64}};
-  const int code = static_cast<int>(number(kType, kInt16));
+  const int code = static_cast<int>(number(kNiftiTypeAt, kInt16));
   const auto type = kTypes.find(code);
   if (type == kTypes.end()) refuse_type(std::to_string(code) + " of NIfTI", file);
-  const double dimensions = number(kDim, kInt16);
+  const double dimensions = number(kNiftiDimAt, kInt16);
   if (!(dimensions >= 1 && dimensions <= 7)) file.fail("its number of dimensions is out of range");
   std::vector<double> sizes;
-  for (int d = 1; d <= static_cast<int>(dimensions); ++d) sizes.push_back(number(kDim + 2 * d, kInt16));
+  for (int d = 1; d <= static_cast<int>(dimensions); ++d) sizes.push_back(number(kNiftiDimAt + 2 * d, kInt16));
   LabelGrid grid;
   take_counts(grid, sizes, file);
-  const double slope = number(kSlope, kFloat32), intercept = number(kIntercept, kFloat32);
+  const double slope = number(kNiftiSlopeAt, kFloat32), intercept = number(kNiftiInterceptAt, kFloat32);
   if ((slope != 0 && slope != 1) || (slope == 1 && intercept != 0))
     file.fail("its numbers are scaled, expected labels");
   std::array<double, 4> pixdim;
-  for (std::size_t d = 0; d < 4; ++d) pixdim[d] = number(kPixdim + 4 * d, kFloat32);
-  if (number(kSform, kInt16) > 0) {
+  for (std::size_t d = 0; d < 4; ++d) pixdim[d] = number(kNiftiPixdimAt + 4 * d, kFloat32);
+  if (number(kNiftiSformAt, kInt16) > 0) {
     for (int row = 0; row < 3; ++row) {
-      for (int a = 0; a < 3; ++a) grid.edges(row, a) = number(kRows + 16 * row + 4 * a, kFloat32);
-      grid.origin[row] = number(kRows + 16 * row + 12, kFloat32);
+      for (int a = 0; a < 3; ++a) grid.edges(row, a) = number(kNiftiRowsAt + 16 * row + 4 * a, kFloat32);
+      grid.origin[row] = number(kNiftiRowsAt + 16 * row + 12, kFloat32);
     }
   } else {
     Mat3 turn = Mat3::Identity();
-    if (number(kQform, kInt16) > 0) {
-      const double b = number(kQuaternion, kFloat32), c = number(kQuaternion + 4, kFloat32),
-                   d = number(kQuaternion + 8, kFloat32);
+    if (number(kNiftiQformAt, kInt16) > 0) {
+      const double b = number(kNiftiQuaternionAt, kFloat32), c = number(kNiftiQuaternionAt + 4, kFloat32),
+                   d = number(kNiftiQuaternionAt + 8, kFloat32);
       turn = Eigen::Quaterniond(std::sqrt(std::max(0.0, 1 - b * b - c * c - d * d)), b, c, d).toRotationMatrix();
       if (pixdim[0] < 0) turn.col(2) *= -1;
-      for (int a = 0; a < 3; ++a) grid.origin[a] = number(kQoffset + 4 * a, kFloat32);
+      for (int a = 0; a < 3; ++a) grid.origin[a] = number(kNiftiQoffsetAt + 4 * a, kFloat32);
     }
     for (int a = 0; a < 3; ++a) grid.edges.col(a) = pixdim[a + 1] * turn.col(a);
   }
   require_sound_axes(grid, file);
-  const double offset = number(kOffset, kFloat32);
-  if (!(offset >= kHeader && offset <= static_cast<double>(bytes.size())))
+  const double offset = number(kNiftiVoxelOffsetAt, kFloat32);
+  if (!(offset >= kNiftiHeaderBytes && offset <= static_cast<double>(bytes.size())))
     file.fail("its volume starts beyond its end");
   take_labels(grid, std::string_view(bytes).substr(static_cast<std::size_t>(offset)), type->second, order, file);
   return grid;

@@ -66,12 +66,12 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
   std::vector<MeshDefect> defects = validate(parsed.mesh);
   const auto is_fatal = [](const MeshDefect& d) { return !is_warning(d) && d.kind != MeshDefect::Kind::bad_tag; };
   if (std::any_of(defects.begin(), defects.end(), is_fatal)) {
-    constexpr int kMostNamed = 20;
+    constexpr int kMostNamedDefects = 20;
     std::string text;
     int named = 0, more = 0;
     for (const MeshDefect& defect : defects) {
       if (!is_fatal(defect)) continue;
-      if (named == kMostNamed) {
+      if (named == kMostNamedDefects) {
         ++more;
         continue;
       }

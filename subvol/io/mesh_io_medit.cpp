@@ -258,14 +258,14 @@ class MeditParser {
 
   /// Reads "NUMBER NAME"; the name is the rest of the line.
   Group read_name(std::string_view opening, std::string_view text) const {
-    constexpr std::string_view kBlanks = " \t";
-    const std::size_t begin = std::min(text.find_first_not_of(kBlanks), text.size());
-    const std::size_t end = std::min(text.find_first_of(kBlanks, begin), text.size());
+    constexpr std::string_view kMeditBlanks = " \t";
+    const std::size_t begin = std::min(text.find_first_not_of(kMeditBlanks), text.size());
+    const std::size_t end = std::min(text.find_first_of(kMeditBlanks, begin), text.size());
     const auto number = parse_integer(text.substr(begin, end - begin));
-    const std::size_t name = text.find_first_not_of(kBlanks, end);
+    const std::size_t name = text.find_first_not_of(kMeditBlanks, end);
     const bool fits = number && *number >= std::numeric_limits<int>::min() && *number <= std::numeric_limits<int>::max();
     if (!fits || name == text.npos) scan_.fail("expected '#" + std::string(opening) + " NUMBER NAME'");
-    const std::size_t last = text.find_last_not_of(kBlanks);
+    const std::size_t last = text.find_last_not_of(kMeditBlanks);
     return {std::string(text.substr(name, last + 1 - name)), static_cast<int>(*number), opening == kCellName ? 3 : 2};
   }
 

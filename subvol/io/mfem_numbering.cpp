@@ -92,7 +92,7 @@ struct NumberedFace {
 };
 
 /// Coordinates of the corners of a face along its first and last edge.
-constexpr std::array<std::array<int, 2>, 4> kCorner{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+constexpr std::array<std::array<int, 2>, 4> kMfemQuadCorners{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
 
 /// Number among a face's inner nodes of the point i, j of a face with these corners.
 std::size_t place_in(const NumberedFace& face, std::span<const Index> corners, int i, int j, int order) {
@@ -106,8 +106,8 @@ std::size_t place_in(const NumberedFace& face, std::span<const Index> corners, i
     for (int row = 1; row < b; ++row) before += order - 1 - row;
     return static_cast<std::size_t>(before + a - 1);
   }
-  const auto origin = kCorner[local(face.corners[0])], first = kCorner[local(face.corners[1])],
-             last = kCorner[local(face.corners[3])];
+  const auto origin = kMfemQuadCorners[local(face.corners[0])], first = kMfemQuadCorners[local(face.corners[1])],
+             last = kMfemQuadCorners[local(face.corners[3])];
   const int di = i - order * origin[0], dj = j - order * origin[1];
   const int a = di * (first[0] - origin[0]) + dj * (first[1] - origin[1]);
   const int b = di * (last[0] - origin[0]) + dj * (last[1] - origin[1]);

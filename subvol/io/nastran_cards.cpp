@@ -228,11 +228,11 @@ void NastranCards::repeat_with_changes() {
 }
 
 void NastranCards::repeat(std::int64_t times) {
-  constexpr std::int64_t kMostRepeated = 1 << 20;  // a short line stands for many cards
+  constexpr std::int64_t kMostRepeatedCards = 1 << 20;  // a short line stands for many cards
   if (steps_.empty()) return;
   require_short(last_);
-  if (times > kMostRepeated - num_repeated_)
-    card_.fail("more than " + std::to_string(kMostRepeated) + " repeated cards");
+  if (times > kMostRepeatedCards - num_repeated_)
+    card_.fail("more than " + std::to_string(kMostRepeatedCards) + " repeated cards");
   for (; times > 0; --times, ++num_repeated_) {
     last_.place = card_.place;
     for (std::size_t i = 1; i < steps_.size(); ++i)

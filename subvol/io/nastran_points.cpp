@@ -15,8 +15,8 @@ namespace {
 /// Cartesian coordinates from those of a system of the kind 'r', 'c' (radius, angle, height) or 's' (radius, angle from
 /// the z axis, angle around it). Angles are in degrees.
 Vec3 cartesian(const Vec3& p, char kind) {
-  constexpr double kDegree = std::numbers::pi / 180;
-  const double a = p[1] * kDegree, b = p[2] * kDegree;
+  constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+  const double a = p[1] * kRadiansPerDegree, b = p[2] * kRadiansPerDegree;
   if (kind == 'c') return {p[0] * std::cos(a), p[0] * std::sin(a), p[2]};
   if (kind == 's') return p[0] * Vec3(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
   return p;
@@ -78,14 +78,14 @@ std::vector<Vec3> NastranPoints::positions() {
 }
 
 Vec3 NastranPoints::in_basic(const Vec3& coordinates, std::int64_t system, const FilePlace& place, int depth) {
-  constexpr int kMostDepth = 1000;  // of systems in one another, for the stack
+  constexpr int kMostCoordinateSystemDepth = 1000;  // of systems in one another, for the stack
   if (system == kByDefault) system = default_system_;
   if (system == 0) return coordinates;
   const auto found = systems_.find(system);
   const std::string name = "coordinate system " + std::to_string(system);
   if (found == systems_.end()) fail_at(place, "a point is in " + name + ", which the file does not have");
   System& used = found->second;
-  if (used.state == State::open || depth > kMostDepth) used.card.fail(name + " refers to itself");
+  if (used.state == State::open || depth > kMostCoordinateSystemDepth) used.card.fail(name + " refers to itself");
   if (used.state == State::unread) read_system(used, depth);
   return used.axes * cartesian(coordinates, used.card.name()[5]) + used.origin;
 }

@@ -232,13 +232,14 @@ class CgnsParser {
 
   void read_coordinates() {
     std::vector<double> axes[3];
-    constexpr const char* kNames[] = {"CoordinateX", "CoordinateY", "CoordinateZ"};
+    constexpr const char* kCgnsCoordinateNames[] = {"CoordinateX", "CoordinateY", "CoordinateZ"};
     const cgsize_t first = 1, last = static_cast<cgsize_t>(num_nodes_);
     for (int k = 0; k < 3; ++k) {
       axes[k].resize(num_nodes_);
       if (num_nodes_ == 0) continue;
-      require(cg_coord_read(file_, base_, zone_, kNames[k], CGNS_ENUMV(RealDouble), &first, &last, axes[k].data()),
-              in_zone(kNames[k]));
+      require(cg_coord_read(file_, base_, zone_, kCgnsCoordinateNames[k], CGNS_ENUMV(RealDouble), &first, &last,
+                            axes[k].data()),
+              in_zone(kCgnsCoordinateNames[k]));
     }
     for (std::size_t v = 0; v < num_nodes_; ++v) {
       mesh_.positions.emplace_back(axes[0][v], axes[1][v], axes[2][v]);

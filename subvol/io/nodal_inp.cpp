@@ -46,7 +46,7 @@ class InpParser {
   }
 
  private:
-  static constexpr std::size_t kNone = InpSets::kNone;
+  static constexpr std::size_t kNoElementSet = InpSets::kNoInpSet;
 
   [[noreturn]] void fail(const std::string& what) const { fail_at(place_, what); }
 
@@ -141,7 +141,8 @@ class InpParser {
         fail("elements of type " + in_quotes(type) + " are not read, expected C3D4, 5, 6, 8, 10, 15, 20 or 27");
       type_ = found;
     }
-    set_ = line_->has("ELSET") ? content_.element_sets.defined(line_->parameter("ELSET"), line_->instance) : kNone;
+    set_ =
+        line_->has("ELSET") ? content_.element_sets.defined(line_->parameter("ELSET"), line_->instance) : kNoElementSet;
     skipped_type_ = type;
   }
 
@@ -171,7 +172,7 @@ class InpParser {
       const std::int64_t number = label(fields[at++], "the number of an element");
       if (!content_.elements_by_label.try_emplace(number, static_cast<Index>(content_.elements.size())).second)
         fail("a second element " + std::to_string(number % kInpNumbers));
-      if (set_ != kNone) content_.element_sets.add_range(set_, number, number, 1, place_);
+      if (set_ != kNoElementSet) content_.element_sets.add_range(set_, number, number, 1, place_);
       content_.elements.push_back(
           {type_, content_.element_nodes.size(), static_cast<std::size_t>(type_->digits), set_, place_});
       element_open_ = true;
@@ -262,7 +263,7 @@ class InpParser {
     const auto [instance, rest] = split(fields[0], instance_of_set());
     const bool is_element = parse_integer(rest).has_value();
     content_.sides.push_back({is_element ? label(rest, "the number of an element", instance) : 0,
-                              is_element ? kNone : content_.element_sets.named(rest, instance),
+                              is_element ? kNoElementSet : content_.element_sets.named(rest, instance),
                               static_cast<int>(*number), surface_, place_});
   }
 
@@ -274,7 +275,7 @@ class InpParser {
   const InpType* type_ = nullptr;
   std::string skipped_type_;
   InpSets* sets_ = nullptr;  ///< of the set that is being read
-  std::size_t set_ = kNone;
+  std::size_t set_ = kNoElementSet;
   Index surface_ = kNoIndex;
   bool element_open_ = false, from_element_set_ = false;
 };

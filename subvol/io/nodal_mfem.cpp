@@ -15,7 +15,7 @@ namespace subvol::internal {
 namespace {
 
 /// MFEM's numbers of shapes.
-constexpr int kTriangle = 2, kSquare = 3, kTet = 4, kCube = 5, kPrism = 6, kPyramid = 7;
+constexpr int kMfemTriangle = 2, kMfemSquare = 3, kMfemTet = 4, kMfemCube = 5, kMfemPrism = 6, kMfemPyramid = 7;
 constexpr int kCornersOfShape[] = {1, 2, 3, 4, 4, 8, 6, 5};
 
 /// How the nodes of a curved mesh are stored.
@@ -80,13 +80,13 @@ class MfemParser {
   };
   Entry read_entry() {
     const std::int64_t attribute = scan_.integer("an attribute"), shape = scan_.integer("a shape");
-    if (shape < 0 || shape > kPyramid) scan_.fail("expected a shape from 0 to 7");
-    constexpr std::int64_t kMost = std::numeric_limits<int>::max();
-    if (attribute < -kMost || attribute > kMost) scan_.fail("expected an attribute of 32 bits");
+    if (shape < 0 || shape > kMfemPyramid) scan_.fail("expected a shape from 0 to 7");
+    constexpr std::int64_t kMostMfemNumber = std::numeric_limits<int>::max();
+    if (attribute < -kMostMfemNumber || attribute > kMostMfemNumber) scan_.fail("expected an attribute of 32 bits");
     Entry entry{static_cast<int>(attribute), static_cast<int>(shape), {}};
     for (int i = 0; i < kCornersOfShape[shape]; ++i) {
       const std::int64_t v = scan_.integer("a vertex");
-      if (v < 0 || v > kMost) scan_.fail("expected the number of a vertex, found " + std::to_string(v));
+      if (v < 0 || v > kMostMfemNumber) scan_.fail("expected the number of a vertex, found " + std::to_string(v));
       largest_vertex_ = std::max(largest_vertex_, static_cast<Index>(v));
       entry.corners.push_back(static_cast<Index>(v));
     }
@@ -97,9 +97,9 @@ class MfemParser {
     const std::size_t n = scan_.count("the number of elements", 3);
     for (std::size_t e = 0; e < n; ++e) {
       const Entry entry = read_entry();
-      if (entry.shape < kTet) scan_.fail("expected tetrahedra (4), cubes (5), prisms (6) and pyramids (7)");
-      constexpr CellKind kKinds[] = {CellKind::tet, CellKind::hex, CellKind::prism, CellKind::pyramid};
-      kinds_.push_back(kKinds[entry.shape - kTet]);
+      if (entry.shape < kMfemTet) scan_.fail("expected tetrahedra (4), cubes (5), prisms (6) and pyramids (7)");
+      constexpr CellKind kMfemCellKinds[] = {CellKind::tet, CellKind::hex, CellKind::prism, CellKind::pyramid};
+      kinds_.push_back(kMfemCellKinds[entry.shape - kMfemTet]);
       corners_.insert(corners_.end(), entry.corners.begin(), entry.corners.end());
       offsets_.push_back(corners_.size());
       mesh_.references.push_back(entry.attribute);
@@ -112,7 +112,7 @@ class MfemParser {
     std::size_t num_others = 0;
     for (std::size_t e = 0; e < n; ++e) {
       const Entry entry = read_entry();
-      if (entry.shape == kTriangle || entry.shape == kSquare)
+      if (entry.shape == kMfemTriangle || entry.shape == kMfemSquare)
         add_face(mesh_, entry.corners, groups.by_number(entry.attribute));
       else
         ++num_others;

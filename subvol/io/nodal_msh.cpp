@@ -424,10 +424,10 @@ class MshParser {
 
   /// The reference that a group's name stands for, if `write_volume` may have named it.
   std::optional<int> named_reference(int group) const {
-    constexpr std::string_view kOwn = "reference ";
+    constexpr std::string_view kReferenceNamePrefix = "reference ";
     const auto name = names_[3].find(group);
-    if (name == names_[3].end() || !name->second.starts_with(kOwn)) return std::nullopt;
-    const auto reference = parse_integer(std::string_view(name->second).substr(kOwn.size()));
+    if (name == names_[3].end() || !name->second.starts_with(kReferenceNamePrefix)) return std::nullopt;
+    const auto reference = parse_integer(std::string_view(name->second).substr(kReferenceNamePrefix.size()));
     if (!reference || std::abs(*reference) > kMostNumber) return std::nullopt;
     return static_cast<int>(*reference);
   }

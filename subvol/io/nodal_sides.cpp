@@ -40,7 +40,7 @@ std::vector<bool> edge_nodes(const NodalMesh& mesh, int order) {
 }
 
 bool has_edge_nodes_only(const NodalMesh& mesh) {
-  constexpr double kRounding = 64 * std::numeric_limits<double>::epsilon();
+  constexpr double kEdgeNodeRounding = 64 * std::numeric_limits<double>::epsilon();
   double reach = 0;
   for (const Vec3& x : mesh.positions) reach = std::max(reach, x.cwiseAbs().maxCoeff());
   NodalMesh completed;
@@ -54,7 +54,7 @@ bool has_edge_nodes_only(const NodalMesh& mesh) {
     for (std::size_t i = given; i < others.size(); ++i) {
       const Vec3 &x = mesh.positions[static_cast<std::size_t>(mesh.cell(c)[i])],
                  &y = completed.positions[static_cast<std::size_t>(others[i])];
-      if ((x - y).cwiseAbs().maxCoeff() > kRounding * reach) return false;
+      if ((x - y).cwiseAbs().maxCoeff() > kEdgeNodeRounding * reach) return false;
     }
   }
   return true;

@@ -254,9 +254,9 @@ std::string ExodusMesh::write() {
 }
 
 void ExodusMesh::declare() {
-  constexpr float kVersion = 5.1f;
-  file_.attribute("api_version", kVersion);
-  file_.attribute("version", kVersion);
+  constexpr float kExodusVersion = 5.1f;
+  file_.attribute("api_version", kExodusVersion);
+  file_.attribute("version", kExodusVersion);
   file_.attribute("floating_point_word_size", 8);
   file_.attribute("file_size", 1);
   file_.attribute("maximum_name_length", static_cast<int>(longest_));

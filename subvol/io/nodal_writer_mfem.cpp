@@ -99,9 +99,9 @@ std::string mfem_text(const NodalMesh& mesh) {
       std::to_string(mesh.num_cells()) + "\n";
   PositiveNumbers attributes(mesh.references);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    constexpr const char* kShapes[] = {" 4", " 6", " 5", " 7"};
+    constexpr const char* kMfemShapeTexts[] = {" 4", " 6", " 5", " 7"};
     text += std::to_string(attributes.of(mesh.references.empty() ? 0 : mesh.references[c])) +
-            kShapes[static_cast<std::size_t>(mesh.kinds[c])];
+            kMfemShapeTexts[static_cast<std::size_t>(mesh.kinds[c])];
     for (const Index v : corners.cell(c)) text += " " + std::to_string(v);
     text += '\n';
   }

@@ -19,9 +19,9 @@ struct XdmfShape {
 };
 
 XdmfShape cell_shape(CellKind kind, int order) {
-  constexpr XdmfShape kLinear[] = {{"Tetrahedron", 6}, {"Wedge", 8}, {"Hexahedron", 9}, {"Pyramid", 7}};
-  constexpr XdmfShape kQuadratic[] = {{"Tetrahedron_10", 38}, {"Wedge_18", 41}, {"Hexahedron_27", 50}};
-  return (order == 1 ? kLinear : kQuadratic)[static_cast<std::size_t>(kind)];
+  constexpr XdmfShape kXdmfLinearShapes[] = {{"Tetrahedron", 6}, {"Wedge", 8}, {"Hexahedron", 9}, {"Pyramid", 7}};
+  constexpr XdmfShape kXdmfQuadraticShapes[] = {{"Tetrahedron_10", 38}, {"Wedge_18", 41}, {"Hexahedron_27", 50}};
+  return (order == 1 ? kXdmfLinearShapes : kXdmfQuadraticShapes)[static_cast<std::size_t>(kind)];
 }
 
 XdmfShape face_shape(std::size_t num_corners, int order) {

@@ -34,9 +34,9 @@ std::string number_within(double value, std::size_t width, const Form& form) {
 
 /// CalculiX reads twenty characters of a number, and refuses longer ones.
 void append_inp_position(std::string& text, const Vec3& p) {
-  constexpr std::size_t kWidth = 20;
+  constexpr std::size_t kInpNumberWidth = 20;
   for (int k = 0; k < 3; ++k)
-    text += ", " + number_within(p[k], kWidth, [](const std::string& plain) { return plain; });
+    text += ", " + number_within(p[k], kInpNumberWidth, [](const std::string& plain) { return plain; });
 }
 
 // --- Abaqus and CalculiX --------------------------------------------------------------------------------------------
@@ -128,8 +128,8 @@ std::string padded(std::string text, std::size_t width) {
 /// The shortest text of at most sixteen characters that is closest to a number, with a decimal point as Nastran
 /// requires it.
 std::string nastran_field(double value) {
-  constexpr std::size_t kWidth = 16;
-  return number_within(value, kWidth, [](std::string text) {
+  constexpr std::size_t kNastranFieldWidth = 16;
+  return number_within(value, kNastranFieldWidth, [](std::string text) {
     const std::size_t e = text.find('e');
     if (text.find('.') == std::string::npos) text.insert(e == std::string::npos ? text.size() : e, ".");
     return text;
@@ -154,10 +154,11 @@ void append_nastran_card(std::string& text, std::string name, const std::vector<
 }  // namespace
 
 std::string inp_name(const std::string& wanted) {
-  constexpr std::size_t kLongest = 72;  // Abaqus allows 80
+  constexpr std::size_t kMostInpNameLength = 72;  // Abaqus allows 80
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   std::string name;
-  for (const char c : wanted.substr(0, kLongest)) name += is_letter(c) || (c >= '0' && c <= '9') || c == '-' ? c : '_';
+  for (const char c : wanted.substr(0, kMostInpNameLength))
+    name += is_letter(c) || (c >= '0' && c <= '9') || c == '-' ? c : '_';
   if (name.find_first_not_of('_') == std::string::npos) return {};
   return is_letter(name[0]) ? name : "N" + name;
 }
@@ -214,9 +215,9 @@ std::string nastran_text(const NodalMesh& mesh) {
     text += "\n*       " + nastran_field(mesh.positions[n][2]) + "\n";
   }
   // Nastran has the middles of upright edges before those of the top.
-  constexpr std::array<std::size_t, 15> kPrism{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11};
-  constexpr std::array<std::size_t, 20> kHex{0,  1,  2,  3,  4,  5,  6,  7,  8,  9,
-                                             10, 11, 16, 17, 18, 19, 12, 13, 14, 15};
+  constexpr std::array<std::size_t, 15> kNastranPrismNodes{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11};
+  constexpr std::array<std::size_t, 20> kNastranHexNodes{0,  1,  2,  3,  4,  5,  6,  7,  8,  9,
+                                                         10, 11, 16, 17, 18, 19, 12, 13, 14, 15};
   constexpr const char* kCards[] = {"CTETRA", "CPENTA", "CHEXA", "CPYRAM"};
   std::vector<std::int64_t> numbers;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -224,7 +225,9 @@ std::string nastran_text(const NodalMesh& mesh) {
     numbers = {static_cast<std::int64_t>(c) + 1, properties.of(reference_of(mesh, c))};
     const std::size_t count = num_edge_nodes(kind, order);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t place = kind == CellKind::hex ? kHex[i] : kind == CellKind::prism ? kPrism[i] : i;
+      const std::size_t place = kind == CellKind::hex     ? kNastranHexNodes[i]
+                                : kind == CellKind::prism ? kNastranPrismNodes[i]
+                                                          : i;
       numbers.push_back(std::int64_t{mesh.cell(c)[place]} + 1);
     }
     append_nastran_card(text, kCards[static_cast<std::size_t>(kind)], numbers);

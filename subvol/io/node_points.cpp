@@ -33,8 +33,8 @@ std::vector<double> lobatto_points(int order) {
   for (int i = 1; 2 * i <= order; ++i) {
     // Newton's method for P'_n, written by P_n and P_(n-1); Chebyshev's points are near enough to start from.
     double x = -std::cos(std::numbers::pi * i / order);
-    constexpr int kSteps = 20;  // it takes five or less
-    for (int step = 0; step < kSteps && 2 * i < order; ++step) {
+    constexpr int kMostLobattoNewtonSteps = 20;  // it takes five or less
+    for (int step = 0; step < kMostLobattoNewtonSteps && 2 * i < order; ++step) {
       const auto [value, before] = legendre(order, x);
       const double slope = order * (before - x * value) / (1 - x * x);                      // P'_n
       const double curvature = (2 * x * slope - order * (order + 1) * value) / (1 - x * x); // P''_n

@@ -8,12 +8,12 @@
 namespace subvol::internal {
 
 void require_sound_nodes(const std::string& name, const SceneNodes& children, std::size_t root) {
-  constexpr std::size_t kMostRepeated = 1 << 20;  // nodes that share children could double with every level
+  constexpr std::size_t kMostRepeatedSceneNodes = 1 << 20;  // nodes that share children could double with every level
   enum class State : char { unseen, open, done };
   struct Place {
     std::size_t node, next = 0;
   };
-  const std::size_t most = children.size() + kMostRepeated;
+  const std::size_t most = children.size() + kMostRepeatedSceneNodes;
   std::vector<State> states(children.size(), State::unseen);
   std::vector<std::size_t> counts(children.size(), 1);  // of a node and all below it
   std::vector<int> depths(children.size(), 1);

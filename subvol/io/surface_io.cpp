@@ -271,9 +271,9 @@ namespace {
 /// Refuses a surface of which a vertex is so far away that the rest is a point beside it: a digit was lost, or a
 /// coordinate was never set.
 void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& remarks) {
-  constexpr double kStray = 1e6;  // times the distance of most vertices
-  constexpr double kMost = 0.75;  // share of the vertices
-  const auto place = static_cast<std::ptrdiff_t>(kMost * static_cast<double>(positions.size() - 1));
+  constexpr double kStray = 1e6;              // times the distance of most vertices
+  constexpr double kUsualVertexShare = 0.75;  // they lie within the usual distance
+  const auto place = static_cast<std::ptrdiff_t>(kUsualVertexShare * static_cast<double>(positions.size() - 1));
   std::vector<double> values(positions.size());
   Vec3 middle;
   for (int axis = 0; axis < 3; ++axis) {

@@ -180,10 +180,10 @@ class ThreeMfParser {
   /// Adds an object with its components. group: the name of the object that it is a part of, if that has one.
   void add_object(const ModelPart& part, const std::string& id, const Transform& transform, const std::string& group,
                   int depth) {
-    constexpr int kMostDepth = 16;
+    constexpr int kMost3mfComponentDepth = 16;
     const auto found = part.objects.find(id);
     if (found == part.objects.end()) part.fail(name_, "there is no object " + in_quotes(id));
-    if (depth > kMostDepth) part.fail(name_, "components include themselves");
+    if (depth > kMost3mfComponentDepth) part.fail(name_, "components include themselves");
     const pugi::xml_node object = found->second;
     count_visited(num_children(object), part);
     const std::string_view type = object.attribute("type").as_string("model");
@@ -208,9 +208,9 @@ class ThreeMfParser {
 
   /// Counts elements that are visited. Each takes some bytes of its part; beyond these, it is visited again.
   void count_visited(std::size_t elements, const ModelPart& part) {
-    constexpr std::size_t kMostRepeated = 1 << 25;  // components of components could double with every level
+    constexpr std::size_t kMostRepeatedMeshItems = 1 << 25;  // components of components could double with every level
     num_visited_ += elements;
-    if (num_visited_ > num_bytes_ + kMostRepeated)
+    if (num_visited_ > num_bytes_ + kMostRepeatedMeshItems)
       part.fail(name_, "components repeat objects of more than 33 million vertices and triangles in all");
   }
 

@@ -67,10 +67,11 @@ class SceneParser {
     for (unsigned m = 0; m < node.mNumMeshes; ++m) {
       if (node.mMeshes[m] >= scene_.mNumMeshes) fail("a node names a mesh that does not exist");
       const aiMesh& mesh = *scene_.mMeshes[node.mMeshes[m]];
-      constexpr std::size_t kMostRepeated = 1 << 25;  // many nodes may share a large mesh
+      constexpr std::size_t kMostRepeatedMeshItems = 1 << 25;  // many nodes may share a large mesh
       if (!used_meshes_.insert(node.mMeshes[m]).second)
         num_repeated_ += std::size_t{mesh.mNumVertices} + mesh.mNumFaces;
-      if (num_repeated_ > kMostRepeated) fail("nodes repeat meshes of more than 33 million vertices and faces in all");
+      if (num_repeated_ > kMostRepeatedMeshItems)
+        fail("nodes repeat meshes of more than 33 million vertices and faces in all");
       add_mesh(mesh, node, transform);
     }
     for (unsigned c = 0; c < node.mNumChildren; ++c) add_node(*node.mChildren[c], transform);
@@ -131,14 +132,14 @@ std::string without_leading_blanks(std::string_view xml) {
 
 /// Refuses COLLADA whose lists of indices hold anything but whole numbers, because Assimp never ends reading these.
 void require_whole_indices(const std::string& name, std::string_view bytes) {
-  constexpr std::string_view kNumbers = "0123456789+- \t\r\n";
+  constexpr std::string_view kColladaIndexCharacters = "0123456789+- \t\r\n";
   for (const std::string_view tag : {"<p", "<vcount"})
     for (std::size_t at = bytes.find(tag); at != std::string_view::npos; at = bytes.find(tag, at + 1)) {
       const std::size_t open = bytes.find('>', at), behind = at + tag.size();
       if (open == std::string_view::npos) return;
       if ((behind != open && kXmlBlanks.find(bytes[behind]) == std::string_view::npos) || bytes[open - 1] == '/')
         continue;
-      const std::size_t end = bytes.find_first_not_of(kNumbers, open + 1);
+      const std::size_t end = bytes.find_first_not_of(kColladaIndexCharacters, open + 1);
       if (end == std::string_view::npos) return;
       if (bytes.substr(end, 2) != "</")
         throw InputError(name + ": expected whole numbers in " + std::string(tag) + ">, found " +

@@ -45,10 +45,10 @@ void require_shallow_json(const std::string& name, std::string_view json) {
 
 /// Returns the JSON of a binary glTF file, as far as it is there: its length stands in the header of the first part.
 std::string_view json_of_binary(std::string_view bytes) {
-  constexpr std::size_t kLength = 12, kHeaders = 20;
-  if (bytes.size() < kHeaders) return {};
-  const double length = decode(bytes.data() + kLength, kUInt32, std::endian::little);
-  return bytes.substr(kHeaders, static_cast<std::size_t>(length));
+  constexpr std::size_t kGlbLengthAt = 12, kGlbHeaderBytes = 20;
+  if (bytes.size() < kGlbHeaderBytes) return {};
+  const double length = decode(bytes.data() + kGlbLengthAt, kUInt32, std::endian::little);
+  return bytes.substr(kGlbHeaderBytes, static_cast<std::size_t>(length));
 }
 
 bool file_exists(const std::string& path, void*) {
@@ -155,9 +155,9 @@ class GltfParser {
   }
 
   void add_node(int place, const Transform& above, int depth) {
-    constexpr int kMostDepth = 64;
+    constexpr int kMostGltfNodeDepth = 64;
     const tinygltf::Node& node = at(model_.nodes, place, "node");
-    if (depth > kMostDepth || ++num_nodes_ > model_.nodes.size()) fail("nodes are children of themselves");
+    if (depth > kMostGltfNodeDepth || ++num_nodes_ > model_.nodes.size()) fail("nodes are children of themselves");
     const Transform transform = above * transform_of(node);
     if (!transform.matrix().allFinite()) fail("node " + std::to_string(place) + ": a transform that is not finite");
     if (node.mesh >= 0) {
@@ -218,9 +218,9 @@ class GltfParser {
   /// Counts vertices, corners and the like that are read. Each takes at least a byte of the file or its buffers; beyond
   /// these, it is read again.
   void count_read(std::size_t n) {
-    constexpr std::size_t kMostRepeated = 1 << 25;
+    constexpr std::size_t kMostRepeatedMeshItems = 1 << 25;
     num_read_ += n;
-    if (num_read_ > num_bytes_ + kMostRepeated)
+    if (num_read_ > num_bytes_ + kMostRepeatedMeshItems)
       fail("nodes repeat meshes of more than 33 million vertices and corners in all");
   }
 

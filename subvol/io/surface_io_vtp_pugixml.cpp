@@ -98,7 +98,8 @@ class VtpParser {
         numbers.values.push_back(static_cast<std::int64_t>(value));
       }
       const bool fits = cells_.empty() || numbers.values.size() > cells_.back();
-      if (fits && (numbers.name == kOwn || reference_name_rank(numbers.name))) arrays.push_back(std::move(numbers));
+      if (fits && (numbers.name == kOwnVtpGroupArray || reference_name_rank(numbers.name)))
+        arrays.push_back(std::move(numbers));
     }
     const CellNumbers* found = nullptr;
     for (const CellNumbers& array : arrays)
@@ -107,7 +108,7 @@ class VtpParser {
     for (const std::size_t cell : cells_) labels_.push_back(found ? static_cast<int>(found->values[cell]) : 0);
   }
   static std::size_t rank(const CellNumbers& array) {
-    return array.name == kOwn ? 0 : 1 + *reference_name_rank(array.name);
+    return array.name == kOwnVtpGroupArray ? 0 : 1 + *reference_name_rank(array.name);
   }
 
   /// 0 is no group in our files, and a group like others in those of others, if there are several.
@@ -116,7 +117,7 @@ class VtpParser {
     GroupList groups;
     FaceGroups& result = parsed.mesh.face_groups;
     constexpr std::size_t kMostGroups = 65536;
-    const bool own = *chosen_ == kOwn;
+    const bool own = *chosen_ == kOwnVtpGroupArray;
     for (const int label : labels_) {
       result.of_face.push_back(own && label == 0 ? kNoIndex : groups.by_number(label));
       if (groups.groups().size() > kMostGroups) {
@@ -149,7 +150,7 @@ class VtpParser {
         if (group.number == known[i] && texts[i] != label_of(group)) group.name = texts[i];
   }
 
-  static constexpr std::string_view kOwn = "group";
+  static constexpr std::string_view kOwnVtpGroupArray = "group";
   VtkXmlFile file_;
   PolygonMesh mesh_;
   LeftOut left_out_;

@@ -140,8 +140,8 @@ std::string ZipArchive::read(const std::string& path) const {
 }
 
 void ZipWriter::add(const std::string& path, std::string_view content) {
-  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
-  if (content.size() > kMost / 2 || bytes_.size() > kMost / 2)
+  constexpr std::size_t kMostZipBytes = std::numeric_limits<std::uint32_t>::max();
+  if (content.size() > kMostZipBytes / 2 || bytes_.size() > kMostZipBytes / 2)
     throw InputError(path + ": more than 2 GB, which a ZIP archive cannot hold");
   Stream deflater{{}, deflateEnd};
   if (deflateInit2(&deflater.stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK)
@@ -154,8 +154,8 @@ void ZipWriter::add(const std::string& path, std::string_view content) {
   if (deflate(&deflater.stream, Z_FINISH) != Z_STREAM_END) throw std::bad_alloc();
   packed.resize(packed.size() - deflater.stream.avail_out);
   std::string common;  // of the header and of the entry in the directory
-  constexpr std::size_t kVersion = 20, kFirstOf1980 = 0x21;
-  append(common, kVersion, 2);
+  constexpr std::size_t kZipVersion = 20, kFirstOf1980 = 0x21;
+  append(common, kZipVersion, 2);
   append(common, 0, 2);  // flags
   append(common, kDeflated, 2);
   append(common, 0, 2);  // time
@@ -166,7 +166,7 @@ void ZipWriter::add(const std::string& path, std::string_view content) {
   append(common, path.size(), 2);
   append(common, 0, 2);  // extra
   directory_ += kDirectoryMark;
-  append(directory_, kVersion, 2);
+  append(directory_, kZipVersion, 2);
   directory_ += common;
   directory_ += std::string(10, '\0');  // comment, disk, attributes
   append(directory_, bytes_.size(), 4);

@@ -21,7 +21,7 @@ using Kind = MeshDefect::Kind;
 using Key = std::array<Index, kMaxCellVertices>;
 
 /// A vertex counts as lying on an edge within this fraction of the edge's length: files often carry six digits.
-constexpr double kOnEdge = 1e-6;
+constexpr double kVertexOnEdgeTolerance = 1e-6;
 
 template <class Range>
 std::string list(const Range& vertices) {
@@ -238,8 +238,10 @@ class Validator {
         }
         const Vec3 offset = mesh_.positions[v] - mesh_.positions[a];
         const double t = offset.dot(along) / length2;
-        const bool on_edge = (offset - t * along).squaredNorm() <= kOnEdge * kOnEdge * length2;
-        if (on_edge && t > reached + kOnEdge && t < step_at - kOnEdge) step = v, step_at = t;
+        const bool on_edge =
+            (offset - t * along).squaredNorm() <= kVertexOnEdgeTolerance * kVertexOnEdgeTolerance * length2;
+        if (on_edge && t > reached + kVertexOnEdgeTolerance && t < step_at - kVertexOnEdgeTolerance)
+          step = v, step_at = t;
       }
       if (step == kNoIndex) return kNoIndex;
       if (first == kNoIndex) first = step;

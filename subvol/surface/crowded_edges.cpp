@@ -7,18 +7,18 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kMostListed = 10;  // places in a message
+constexpr std::size_t kMostListedPlaces = 10;  // in a message
 
 }  // namespace
 
 void PlaceList::add(const std::string& place) {
-  if (++count_ > kMostListed) return;
+  if (++count_ > kMostListedPlaces) return;
   list_ += (list_.empty() ? "" : "; ") + place;
 }
 
 std::string PlaceList::text(const std::string& one, const std::string& many) const {
   return std::to_string(count_) + " " + (count_ == 1 ? one : many) +
-         (count_ > kMostListed ? ", the first " + std::to_string(kMostListed) : "") + ": " + list_ +
+         (count_ > kMostListedPlaces ? ", the first " + std::to_string(kMostListedPlaces) : "") + ": " + list_ +
          " (vertices are numbered from 0, those of no face left out)";
 }
 

@@ -35,7 +35,7 @@ bool are_groups_closed(const TriangleMesh& surface) {
 }  // namespace
 
 std::vector<double> volumes_of_named_solids(const TriangleMesh& surface) {
-  constexpr double kFlat = 1e-9;  // volume of rounding, share of the area to the power of 3/2
+  constexpr double kRoundingVolumeShare = 1e-9;  // of the area to the power of 3/2
   const FaceGroups& groups = surface.face_groups;
   if (groups.groups.size() < 2 || std::ranges::find(groups.of_face, kNoIndex) != groups.of_face.end()) return {};
   std::vector<double> volumes(groups.groups.size(), 0.0), areas(volumes.size(), 0.0);
@@ -49,7 +49,7 @@ std::vector<double> volumes_of_named_solids(const TriangleMesh& surface) {
   std::size_t num_solids = 0;
   for (std::size_t g = 0; g < volumes.size(); ++g) {
     if (origins[g] == kNoIndex) continue;
-    if (!(std::abs(volumes[g]) > kFlat * areas[g] * std::sqrt(areas[g]))) return {};
+    if (!(std::abs(volumes[g]) > kRoundingVolumeShare * areas[g] * std::sqrt(areas[g]))) return {};
     ++num_solids;
   }
   return num_solids > 1 && are_groups_closed(surface) ? volumes : std::vector<double>();

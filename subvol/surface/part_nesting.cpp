@@ -200,9 +200,9 @@ class Depths {
   }
   /// Returns the winding number at a point of a part, of all parts but this one.
   double winding_of_others(std::size_t p, const Vec3& x) {
-    constexpr std::size_t kMost = 100;  // parts whose sum takes about as long as that of thousands together
+    constexpr std::size_t kMostNearParts = 100;  // whose sum takes about as long as that of thousands together
     near_.clear();
-    if (!tree_.gather(x, kMost, near_)) {
+    if (!tree_.gather(x, kMostNearParts, near_)) {
       if (!around_) around_.emplace(outward([](int) { return true; }));
       return around_->at(x) - winding(p).at(x);
     }

@@ -93,8 +93,8 @@ class RegionFinder {
     double area = 0;
     /// Returns true if the cell encloses more than rounding.
     bool has_volume() const {
-      constexpr double kFlat = 1e-9;  // of area^(3/2)
-      return volume > kFlat * area * std::sqrt(area);
+      constexpr double kRoundingVolumeShare = 1e-9;  // of area^(3/2)
+      return volume > kRoundingVolumeShare * area * std::sqrt(area);
     }
     std::vector<Index> sides;
   };
@@ -178,7 +178,7 @@ class RegionFinder {
 
   /// Finds the cell that each part lies in: the smallest that contains all of some of its points.
   void place_parts() {
-    constexpr std::size_t kMostPoints = 16;  // of a part, to bound the time
+    constexpr std::size_t kMostContainmentPoints = 16;  // of a part, to bound the time
     for (std::size_t around = 0; around < parts_with_cells_.size(); ++around) {
       std::vector<std::size_t> candidates;
       for (std::size_t k = 0; k < parts_with_cells_.size(); ++k)
@@ -192,7 +192,7 @@ class RegionFinder {
           Part& part = parts_with_cells_[k];
           if (part.inside && cells_of_parts_[*part.inside].volume <= cell.volume) continue;
           bool contained = true;
-          const std::size_t step = std::max<std::size_t>(1, part.triangles.size() / kMostPoints);
+          const std::size_t step = std::max<std::size_t>(1, part.triangles.size() / kMostContainmentPoints);
           for (std::size_t i = 0; i < part.triangles.size() && contained; i += step) {
             const auto& [a, b, d] = mesh_.triangles[part.triangles[i]];
             contained = winding.at((mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[d]) / 3) > 0.5;
@@ -243,15 +243,15 @@ class RegionFinder {
       for (const std::size_t c : part.cells)
         if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].has_volume();
     }
-    region_of_side_.assign(2 * mesh_.triangles.size(), kOutside);
+    region_of_side_.assign(2 * mesh_.triangles.size(), kOutsideRegion);
     std::vector<std::size_t> cell_of(2 * mesh_.triangles.size());
     for (std::size_t c = 0; c < cells_of_parts_.size(); ++c)
       for (const Index side : cells_of_parts_[c].sides) cell_of[side] = joined[c];
-    std::vector<int> number(cells_of_parts_.size(), kOutside);
+    std::vector<int> number(cells_of_parts_.size(), kOutsideRegion);
     for (std::size_t side = 0; side < cell_of.size(); ++side) {
       const std::size_t c = cell_of[side];
       if (!is_region[c]) continue;
-      if (number[c] == kOutside) number[c] = ++num_regions_;
+      if (number[c] == kOutsideRegion) number[c] = ++num_regions_;
       region_of_side_[side] = number[c];
     }
   }
@@ -260,16 +260,16 @@ class RegionFinder {
   /// enclosed is to be a region. Does nothing if regions are other than the solids, or if no two solids touch.
   void take_solids() {
     if (!solids_) return;
-    constexpr Index kUnknown = kNoIndex - 1;
-    std::vector<Index> solid_of(static_cast<std::size_t>(num_regions_) + 1, kUnknown);
+    constexpr Index kUnknownSolid = kNoIndex - 1;
+    std::vector<Index> solid_of(static_cast<std::size_t>(num_regions_) + 1, kUnknownSolid);
     const auto solid_at = [&](std::size_t side) { return (*solids_)[side / 2][side % 2]; };
     for (std::size_t side = 0; side < region_of_side_.size(); ++side) {
       Index& solid = solid_of[region_of_side_[side]];
-      if (region_of_side_[side] == kOutside) continue;
-      if (solid != kUnknown && solid != solid_at(side)) return;
+      if (region_of_side_[side] == kOutsideRegion) continue;
+      if (solid != kUnknownSolid && solid != solid_at(side)) return;
       solid = solid_at(side);
     }
-    solid_of[kOutside] = kNoIndex;
+    solid_of[kOutsideRegion] = kNoIndex;
     const auto touches = [&](std::size_t t) {
       const Index behind = solid_of[region_of_side_[2 * t]], front = solid_of[region_of_side_[2 * t + 1]];
       return behind != front && behind != kNoIndex && front != kNoIndex;
@@ -277,7 +277,7 @@ class RegionFinder {
     std::size_t t = 0;
     while (t < mesh_.triangles.size() && !touches(t)) ++t;
     if (t == mesh_.triangles.size()) return;
-    std::vector<int> number(solid_of.size(), kOutside);
+    std::vector<int> number(solid_of.size(), kOutsideRegion);
     std::map<Index, int> number_of_solid;
     num_regions_ = 0;
     for (std::size_t r = 1; r < solid_of.size(); ++r) {  // they are numbered by their first sides
@@ -309,7 +309,7 @@ class RegionFinder {
         loose += names_.empty();
         continue;
       }
-      has_interface = has_interface || (sides[0] != kOutside && sides[1] != kOutside);
+      has_interface = has_interface || (sides[0] != kOutsideRegion && sides[1] != kOutsideRegion);
       surface.mesh.triangles.push_back(mesh_.triangles[t]);
       surface.sides.push_back(sides);
       if (!mesh_.face_groups.empty()) surface.mesh.face_groups.of_face.push_back(mesh_.face_groups.of_face[t]);
@@ -330,8 +330,8 @@ class RegionFinder {
 
   /// Gives regions the names of groups that bound them.
   static void name_regions(RegionSurface& surface) {
-    constexpr double kMost = 0.5;      // share of a group's area
-    constexpr double kAll = 1 - 1e-9;  // share of a region's area, up to rounding
+    constexpr double kLeastGroupShare = 0.5;       // of a region's area
+    constexpr double kWholeGroupShare = 1 - 1e-9;  // of a group's area, up to rounding
     const auto& groups = surface.mesh.face_groups;
     if (groups.empty()) return;
     std::vector<double> of_group(groups.groups.size(), 0.0), of_region(surface.regions.size(), 0.0);
@@ -341,7 +341,7 @@ class RegionFinder {
       const double one = triangle_area(surface.mesh, surface.mesh.triangles[t]);
       if (g != kNoIndex) of_group[g] += one;
       for (const int side : surface.sides[t]) {
-        if (side == kOutside) continue;
+        if (side == kOutsideRegion) continue;
         const auto r = static_cast<std::size_t>(side - 1);  // they are numbered from 1 on
         of_region[r] += one;
         if (g != kNoIndex) shared[{g, r}] += one;
@@ -352,7 +352,7 @@ class RegionFinder {
       const auto& [g, r] = key;
       std::string& name = surface.regions[r].name;
       if (g == named || !name.empty() || !(of_group[g] > 0)) continue;
-      if (area < kAll * of_group[g] || of_group[g] < kMost * of_region[r]) continue;
+      if (area < kWholeGroupShare * of_group[g] || of_group[g] < kLeastGroupShare * of_region[r]) continue;
       name = groups.groups[g].name;
       named = g;
     }

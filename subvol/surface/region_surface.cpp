@@ -80,12 +80,12 @@ void orient_sheets(RegionSurface& surface) {
   std::vector<Index> origins(surface.regions.size(), kNoIndex);
   for (std::size_t t = 0; t < surface.sides.size(); ++t) {
     auto& [behind, front] = surface.sides[t];
-    if (behind == kOutside || (front != kOutside && front < behind)) {
+    if (behind == kOutsideRegion || (front != kOutsideRegion && front < behind)) {
       std::swap(behind, front);
       std::swap(surface.mesh.triangles[t][1], surface.mesh.triangles[t][2]);
     }
     for (const int region : surface.sides[t]) {
-      if (region == kOutside) continue;
+      if (region == kOutsideRegion) continue;
       const std::size_t r = place_of(surface, region);
       if (origins[r] == kNoIndex) origins[r] = surface.mesh.triangles[t][0];
       const Vec3& origin = surface.mesh.positions[origins[r]];
@@ -98,7 +98,7 @@ void orient_sheets(RegionSurface& surface) {
 RegionSurface surface_of_regions(const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   const std::vector<int> references = region_references(mesh);
-  const bool keeps = references.front() > kOutside;
+  const bool keeps = references.front() > kOutsideRegion;
   const auto number_of = [&](int reference) {
     return keeps ? reference
                  : 1 + static_cast<int>(std::ranges::lower_bound(references, reference) - references.begin());
@@ -112,7 +112,7 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh) {
   }
   surface.mesh.positions = mesh.positions;
   const auto region_of = [&](Index cell) {
-    if (cell == kNoIndex) return kOutside;
+    if (cell == kNoIndex) return kOutsideRegion;
     return number_of(mesh.references.empty() ? 0 : mesh.references[cell]);
   };
   const auto add = [&](Index f) {
@@ -148,7 +148,7 @@ std::vector<TriangleMesh> boundaries_of_regions(const RegionSurface& surface) {
   std::vector<std::vector<Index>> triangles(surface.regions.size());
   for (std::size_t t = 0; t < surface.sides.size(); ++t)
     for (const int side : surface.sides[t])
-      if (side != kOutside) triangles[place_of(surface, side)].push_back(static_cast<Index>(t));
+      if (side != kOutsideRegion) triangles[place_of(surface, side)].push_back(static_cast<Index>(t));
   std::vector<TriangleMesh> boundaries;
   for (std::size_t r = 0; r < triangles.size(); ++r)
     boundaries.push_back(boundary_of(surface, surface.regions[r].number, triangles[r]));

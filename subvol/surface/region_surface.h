@@ -14,23 +14,23 @@
 namespace subvol {
 
 /// The number of what lies outside all regions.
-inline constexpr int kOutside = 0;
+inline constexpr int kOutsideRegion = 0;
 
 /// A surface that divides space into regions: each triangle knows the region on either side.
 struct RegionSurface {
   TriangleMesh mesh;                      ///< vertices of equal position are one; each triangle is there once
-  /// The regions behind each triangle and in front of it, where its normal points: {region, kOutside} on the outer
-  /// surface, the smaller number first on an interface.
+  /// The regions behind each triangle and in front of it, where its normal points: {region, kOutsideRegion} on the
+  /// outer surface, the smaller number first on an interface.
   std::vector<std::array<int, 2>> sides;
   std::vector<Group> regions;             ///< numbers > 0, ascending, and names where there are any; dimension 3
   std::vector<double> volumes;            ///< of each of `regions`, > 0
   std::vector<std::string> notes;         ///< a sentence for each choice that could have been another
 
   /// Returns true for triangles between two regions.
-  bool is_inner(std::size_t triangle) const { return sides[triangle][1] != kOutside; }
-  /// Returns the pair of regions of each triangle, the smaller number first: kOutside on the outer surface.
+  bool is_inner(std::size_t triangle) const { return sides[triangle][1] != kOutsideRegion; }
+  /// Returns the pair of regions of each triangle, the smaller number first: kOutsideRegion on the outer surface.
   std::array<int, 2> pair(std::size_t triangle) const {
-    return is_inner(triangle) ? sides[triangle] : std::array{kOutside, sides[triangle][0]};
+    return is_inner(triangle) ? sides[triangle] : std::array{kOutsideRegion, sides[triangle][0]};
   }
 };
 
@@ -90,15 +90,15 @@ TriangleMesh outer_surface(const RegionSurface& surface);
 /// triangles  receives their numbers in the surface.
 TriangleMesh inner_surface(const RegionSurface& surface, std::vector<Index>& triangles);
 
-/// Returns the pairs of regions that share triangles, ascending; those with kOutside come first.
+/// Returns the pairs of regions that share triangles, ascending; those with kOutsideRegion come first.
 std::vector<std::array<int, 2>> region_pairs(const RegionSurface& surface);
 
 /// Returns the edges of other than two triangles, and those between different pairs of regions: the curves where sheets
 /// meet, as pairs of vertices, ascending.
 std::vector<std::array<Index, 2>> curve_edges(const RegionSurface& surface);
 
-/// Sets the volumes from the triangles, and turns these as `sides` says. sides: {a, b} for a region or kOutside on
-/// either side of each triangle, those behind it first; different from each other.
+/// Sets the volumes from the triangles, and turns these as `sides` says. sides: {a, b} for a region or kOutsideRegion
+/// on either side of each triangle, those behind it first; different from each other.
 void orient_sheets(RegionSurface& surface);
 
 }  // namespace subvol

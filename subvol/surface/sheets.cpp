@@ -12,7 +12,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr auto kSharp = static_cast<float>(kInfiniteSharpness);
+constexpr auto kFeatureSharpness = static_cast<float>(kInfiniteSharpness);
 
 /// Finds feature curves, fans and corners.
 class FeatureFinder {
@@ -169,13 +169,13 @@ SheetSurface tagged_sheets(const VolumeMesh& mesh, const MeshTopology& topology)
     }
     surface.corner_edges.push_back(static_cast<Index>(sheets.edges.size()));
     surface.edge_corners.push_back(h);
-    surface.edge_sharpness.push_back(features.is_curve(e) ? kSharp : sharpness[e]);
+    surface.edge_sharpness.push_back(features.is_curve(e) ? kFeatureSharpness : sharpness[e]);
     sheets.edges.push_back(e);
   }
   std::vector<float> corners(mesh.num_vertices(), 0.0f);
   for (const CornerVertex& corner : mesh.tags.corners) corners[corner.vertex] = static_cast<float>(corner.sharpness);
   for (const Index v : features.fan_vertices)
-    surface.vertex_sharpness.push_back(features.is_corner(v) ? kSharp : corners[v]);
+    surface.vertex_sharpness.push_back(features.is_corner(v) ? kFeatureSharpness : corners[v]);
   return sheets;
 }
 

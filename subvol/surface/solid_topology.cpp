@@ -151,11 +151,12 @@ SolidBoundary solid_boundary(const TriangleMesh& surface) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (!parts.faces_out(static_cast<std::size_t>(component[t])))
       std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
-  // A surface with a volume below kFlat area^(3/2) is flat up to rounding.
+  // A surface with a volume below kFlatSolidVolumeShare area^(3/2) is flat up to rounding.
   double area = 0;
   for (const auto& t : mesh.triangles) area += triangle_area(mesh, t);
-  constexpr double kFlat = 1e-6;
-  if (!(result.volume > kFlat * area * std::sqrt(area))) throw InputError("surface: it encloses no volume");
+  constexpr double kFlatSolidVolumeShare = 1e-6;
+  if (!(result.volume > kFlatSolidVolumeShare * area * std::sqrt(area)))
+    throw InputError("surface: it encloses no volume");
   result.surface = std::move(mesh);
   return result;
 }

@@ -225,11 +225,11 @@ BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topo
     const float sharpness = checked_sharpness(corner.sharpness, what);
     if (number[corner.vertex] != kNoIndex) surface.vertex_sharpness[number[corner.vertex]] = sharpness;
   }
-  constexpr auto kSharp = static_cast<float>(kInfiniteSharpness);
+  constexpr auto kFeatureSharpness = static_cast<float>(kInfiniteSharpness);
   for (std::size_t e = 0; e < surface.num_edges(); ++e)
-    if (features.is_curve(boundary.edges[e])) surface.edge_sharpness[e] = kSharp;
+    if (features.is_curve(boundary.edges[e])) surface.edge_sharpness[e] = kFeatureSharpness;
   for (std::size_t v = 0; v < surface.num_vertices(); ++v)
-    if (features.is_corner(boundary.vertices[v])) surface.vertex_sharpness[v] = kSharp;
+    if (features.is_corner(boundary.vertices[v])) surface.vertex_sharpness[v] = kFeatureSharpness;
   return boundary;
 }
 

@@ -32,8 +32,8 @@ class SolidAngles {
   void add(const Vec3& a, const Vec3& b, const Vec3& c) {
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
     const double y = a.dot(b.cross(c)), x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    constexpr double kRounding = 1e-15;                     // of the product of the lengths
-    if (!(std::abs(y) > kRounding * la * lb * lc)) return;  // seen from its own plane: no angle
+    constexpr double kSolidAngleRounding = 1e-15;                     // of the product of the lengths
+    if (!(std::abs(y) > kSolidAngleRounding * la * lb * lc)) return;  // seen from its own plane: no angle
     const double length = std::abs(x) + std::abs(y);
     const std::complex<double> before = product_, factor(x / length, y / length);
     product_ = {before.real() * factor.real() - before.imag() * factor.imag(),
@@ -145,8 +145,9 @@ Index WindingNumber::build(std::vector<Index>& order, Index begin, Index end) {
 
 // A far node adds n.r/|r|^3, with r from p to its center, and the derivatives of that applied to its moments.
 double WindingNumber::at(const Vec3& p) const {
-  constexpr std::size_t kDeepest = 64;  // far above the depth of the tree: 2^31 triangles are halved at most 31 times
-  std::array<Index, kDeepest> stack{0};
+  // Far above the depth of the tree: 2^31 triangles are halved at most 31 times.
+  constexpr std::size_t kWindingStackSize = 64;
+  std::array<Index, kWindingStackSize> stack{0};
   std::size_t size = 1;
   double sum = 0;
   SolidAngles near;

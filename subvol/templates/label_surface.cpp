@@ -46,7 +46,7 @@ class LabelSheets {
       throw InputError("segmentation: it has more than 2^31 - 1 voxels, those of the empty layers around it included");
     values_ = grid.labels;
     sort_unique(values_);
-    std::erase(values_, kOutside);
+    std::erase(values_, kOutsideRegion);
     if (values_.empty()) throw InputError("segmentation: no voxel has a label above 0");
   }
 
@@ -115,7 +115,7 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
     std::vector<int>& of_this = of_label[label];
     for (int& c : of_this) c = sets.of(c);
     sort_unique(of_this);
-    if (keeps_regions && label != kOutside && !of_this.empty()) {
+    if (keeps_regions && label != kOutsideRegion && !of_this.empty()) {
       const auto largest =
           std::max_element(of_this.begin(), of_this.end(), [&](int a, int b) { return size[a] < size[b]; });
       of_this.erase(largest);
@@ -146,14 +146,14 @@ VoxelLabels LabelSheets::cleaned() {
   const auto [nx, ny, nz] = grid_.counts;
   VoxelLabels labels({nx + 2 * kRim, ny + 2 * kRim, nz + 2 * kRim}, static_cast<int>(values_.size()),
                      VertexRule::manifold);
-  std::vector<int> given(labels.num_cells(), kOutside);
+  std::vector<int> given(labels.num_cells(), kOutsideRegion);
   std::size_t from = 0;
   for (int k = 0; k < nz; ++k)
     for (int j = 0; j < ny; ++j)
       for (int i = 0; i < nx; ++i, ++from) {
         const int value = grid_.labels[from];
         const Index c = i + kRim + (nx + 2 * kRim) * (j + kRim + (ny + 2 * kRim) * (k + kRim));
-        if (value != kOutside)
+        if (value != kOutsideRegion)
           given[c] = 1 + static_cast<int>(std::ranges::lower_bound(values_, value) - values_.begin());
         labels.set(c, given[c]);
       }
@@ -166,7 +166,7 @@ VoxelLabels LabelSheets::cleaned() {
   specks_ = drop_specks(labels, false);
   wanted_.assign(values_.size(), 0.0);
   for (const int label : labels.labels())
-    if (label != kOutside) wanted_[static_cast<std::size_t>(label - 1)] += 1;
+    if (label != kOutsideRegion) wanted_[static_cast<std::size_t>(label - 1)] += 1;
   for (std::size_t r = 0; r < values_.size(); ++r)
     if (wanted_[r] == 0)
       throw InputError("segmentation: label " + std::to_string(values_[r]) +
@@ -188,7 +188,7 @@ VoxelLabels LabelSheets::cleaned() {
 void LabelSheets::require_regions(const VoxelLabels& labels) const {
   std::vector<std::size_t> left(values_.size(), 0);
   for (const int label : labels.labels())
-    if (label != kOutside) ++left[static_cast<std::size_t>(label - 1)];
+    if (label != kOutsideRegion) ++left[static_cast<std::size_t>(label - 1)];
   for (std::size_t r = 0; r < values_.size(); ++r) {
     const auto count = static_cast<double>(left[r]);
     if (count > 0 && (left[r] >= options_.least_voxels || 2 * count >= wanted_[r])) continue;
@@ -221,7 +221,7 @@ void LabelSheets::list_faces(const VoxelLabels& labels) {
         const int behind = labels.label(static_cast<Index>(c));
         const int front = labels.label(static_cast<Index>(c) + (up ? steps[axis] : -steps[axis]));
         // Each face is listed once, from the side that is behind it.
-        const bool is_mine = behind != kOutside && (front == kOutside || behind < front);
+        const bool is_mine = behind != kOutsideRegion && (front == kOutsideRegion || behind < front);
         if (behind == front || !is_mine) continue;
         const unsigned a = kAxes[axis], u = kAxes[(axis + 1) % 3], v = kAxes[(axis + 2) % 3];
         const auto points = labels.points(static_cast<Index>(c));
@@ -302,8 +302,8 @@ std::vector<double> LabelSheets::volumes() const {
     double below = 0;
     for (const auto& [i, j] : {std::pair(1, 2), std::pair(2, 3)})  // the two triangles that the face becomes
       below += positions_[face.corners[0]].dot(positions_[face.corners[i]].cross(positions_[face.corners[j]])) / 6;
-    if (face.pair[0] != kOutside) result[static_cast<std::size_t>(face.pair[0] - 1)] += below;
-    if (face.pair[1] != kOutside) result[static_cast<std::size_t>(face.pair[1] - 1)] -= below;
+    if (face.pair[0] != kOutsideRegion) result[static_cast<std::size_t>(face.pair[0] - 1)] += below;
+    if (face.pair[1] != kOutsideRegion) result[static_cast<std::size_t>(face.pair[1] - 1)] -= below;
   }
   return result;
 }
@@ -336,7 +336,7 @@ void LabelSheets::restore_volumes() {
     for (const auto& [pair, number] : sheet_of_pair)
       for (const int a : pair)
         for (const int b : pair)
-          if (a != kOutside && b != kOutside)
+          if (a != kOutsideRegion && b != kOutsideRegion)
             matrix.push_back({a - 1, b - 1, (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)]});
     const Eigen::VectorXd y = least_norm_solution(matrix, missing);
     // Normals of each sheet at each vertex, one after the other: at a curve, each sheet asks for its own move.
@@ -347,9 +347,9 @@ void LabelSheets::restore_volumes() {
     std::stable_sort(normals.begin(), normals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<double> step(static_cast<std::size_t>(count), 0.0);
     for (const auto& [pair, number] : sheet_of_pair)
-      step[static_cast<std::size_t>(number)] =
-          std::clamp((pair[0] == kOutside ? 0 : y[pair[0] - 1]) - (pair[1] == kOutside ? 0 : y[pair[1] - 1]),
-                     -kMostSheetStep, kMostSheetStep);
+      step[static_cast<std::size_t>(number)] = std::clamp(
+          (pair[0] == kOutsideRegion ? 0 : y[pair[0] - 1]) - (pair[1] == kOutsideRegion ? 0 : y[pair[1] - 1]),
+          -kMostSheetStep, kMostSheetStep);
     for (std::size_t first = 0, last; first < normals.size();) {
       const Index v = normals[first].first.first;
       Mat3 sum = 1e-3 * Mat3::Identity();
@@ -375,7 +375,7 @@ RegionSurface LabelSheets::result() const {
   for (const Vec3& p : positions_) surface.mesh.positions.push_back(grid_.origin + grid_.edges * p);
   const bool is_mirrored = grid_.edges.determinant() < 0;
   const auto value_of = [&](int label) {
-    return label == kOutside ? kOutside : values_[static_cast<std::size_t>(label - 1)];
+    return label == kOutsideRegion ? kOutsideRegion : values_[static_cast<std::size_t>(label - 1)];
   };
   for (const Face& face : faces_) {
     const auto& [a, b, c, d] = face.corners;

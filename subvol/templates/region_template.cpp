@@ -119,7 +119,7 @@ double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) con
   std::size_t count = 0;
   for (std::size_t c = 0; c < labels.num_cells(); ++c) {
     const int label = labels.label(static_cast<Index>(c));
-    if (label == kOutside) continue;
+    if (label == kOutsideRegion) continue;
     ++count;
     for (const Index offset : labels.face_offsets())
       count += counts_pillow && labels.label(static_cast<Index>(c) + offset) != label;
@@ -201,7 +201,7 @@ RegionSearch::Faults RegionSearch::faults_of(const VoxelLabels& labels, const Re
     if (at == found->sheets.end()) {
       faults.same_pairs = false;
       for (const int side : pair)
-        if (side != kOutside) faults.is_wrong[static_cast<std::size_t>(side - 1)] = 1;
+        if (side != kOutsideRegion) faults.is_wrong[static_cast<std::size_t>(side - 1)] = 1;
     } else {
       faults.wrong_sheets += at->second != sheet;
     }
@@ -302,10 +302,10 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
 RegionTemplate RegionSearch::finished(const LabeledGrid& candidate, std::size_t cells) const {
   RegionTemplate result;
   std::vector<char> kept;
-  for (const int label : candidate.labels) kept.push_back(label != kOutside);
+  for (const int label : candidate.labels) kept.push_back(label != kOutsideRegion);
   result.mesh = voxel_mesh(candidate.grid, kept);
   for (const int label : candidate.labels)
-    if (label != kOutside)
+    if (label != kOutsideRegion)
       result.mesh.references.push_back(surface_.regions[static_cast<std::size_t>(label - 1)].number);
   result.mesh.regions = surface_.regions;
   std::erase_if(result.mesh.regions, [](const Group& region) { return region.name.empty(); });

@@ -40,7 +40,7 @@ bool drop_surplus(VoxelLabels& labels, int label, int wanted, bool& changed) {
   std::vector<std::size_t> size(static_cast<std::size_t>(count), 0);
   for (const int c : component)
     if (c >= 0) ++size[c];
-  if (label == kOutside) size[component[0]] = component.size() + 1;  // the outside itself
+  if (label == kOutsideRegion) size[component[0]] = component.size() + 1;  // the outside itself
   std::vector<int> order(size.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
@@ -101,7 +101,7 @@ std::map<std::array<int, 2>, SheetTopology> topology_of_sheets(std::span<const s
 
 RegionTopology topology_of(const RegionSurface& surface, SearchStop* stop) {
   RegionTopology result;
-  std::map<int, int> place{{kOutside, 0}};
+  std::map<int, int> place{{kOutsideRegion, 0}};
   const std::vector<TriangleMesh> boundaries = boundaries_of_regions(surface);
   for (std::size_t r = 0; r < boundaries.size(); ++r) {
     if (is_stopped(stop)) return result;
@@ -126,18 +126,18 @@ VoxelLabels::VoxelLabels(const std::array<int, 3>& cells, int num_regions, Verte
       region_table_(&vertex_table(rule)),
       outside_table_(&vertex_table(VertexRule::manifold)),
       frame_(cells, rule),
-      labels_(frame_.num_cells(), kOutside) {}
+      labels_(frame_.num_cells(), kOutsideRegion) {}
 
 bool VoxelLabels::good(Index point) const {
   std::array<int, 8> labels{}, found{};
   const auto around = frame_.cells_around(point);
-  for (std::size_t o = 0; o < 8; ++o) labels[o] = around[o] == kNoIndex ? kOutside : labels_[around[o]];
+  for (std::size_t o = 0; o < 8; ++o) labels[o] = around[o] == kNoIndex ? kOutsideRegion : labels_[around[o]];
   const std::size_t count = distinct(labels, found);
   if (count == 1) return true;
   for (std::size_t i = 0; i < count; ++i) {
     unsigned mask = 0;
     for (unsigned o = 0; o < 8; ++o) mask |= static_cast<unsigned>(labels[o] == found[i]) << o;
-    if (!(found[i] == kOutside ? *outside_table_ : *region_table_)[mask]) return false;
+    if (!(found[i] == kOutsideRegion ? *outside_table_ : *region_table_)[mask]) return false;
   }
   return true;
 }
@@ -299,13 +299,13 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
     const auto c = static_cast<Index>(i);
     if (!labels.may_set(c)) continue;
     double sum = 0, largest = 0;
-    int label = kOutside;
+    int label = kOutsideRegion;
     for (int r = 1; r <= labels.num_regions(); ++r) {
       const double weighted = weights[r] * share(fractions, r, c);
       sum += weighted;
       if (weighted > largest) largest = weighted, label = r;
     }
-    labels.set(c, sum > share(fractions, kOutside, c) ? label : kOutside);
+    labels.set(c, sum > share(fractions, kOutsideRegion, c) ? label : kOutsideRegion);
   }
   std::vector<char> changes(labels.num_cells(), 0);
   const auto share_of = [&](int label, Index cell) { return share(fractions, label, cell); };
@@ -316,7 +316,7 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
       if (is_stopped(stop) ||
           !drop_surplus(labels, r, wanted.regions[static_cast<std::size_t>(r - 1)].components, changed))
         return false;
-    if (!drop_surplus(labels, kOutside, voids, changed)) return false;
+    if (!drop_surplus(labels, kOutsideRegion, voids, changed)) return false;
     if (!changed) return true;
   }
   return false;

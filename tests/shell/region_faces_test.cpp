@@ -42,7 +42,7 @@ TEST_CASE("faces of a region close it and face outward, whatever way the given o
     CHECK(enclosed_volume(faces.surface, faces.is_left_out) == Approx(1.0 / 3));
     CHECK(faces.num_left_out == surface.num_faces() - 12);
   }
-  const RegionFaces outer = faces_of_region(surface, *regions, kOutside);
+  const RegionFaces outer = faces_of_region(surface, *regions, kOutsideRegion);
   CHECK(enclosed_volume(outer.surface, outer.is_left_out) == Approx(1));
   CHECK(outer.num_left_out == 4);
 }

@@ -45,8 +45,8 @@ TEST_CASE("Sheets that divide a box make regions, whatever way their triangles f
     CHECK(region_pairs(*found).size() == 5 + 4);
     for (std::size_t t = 0; t < found->sides.size(); ++t) {
       const auto& [behind, front] = found->sides[t];
-      CHECK(behind != kOutside);
-      CHECK((front == kOutside || behind < front));
+      CHECK(behind != kOutsideRegion);
+      CHECK((front == kOutsideRegion || behind < front));
     }
     for (const Group& region : found->regions) {
       const SolidBoundary solid = solid_boundary(boundary_of_region(*found, region.number));
