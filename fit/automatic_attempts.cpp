@@ -69,7 +69,7 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
 
 double expected_portion(std::span<const AutomaticAttempt> attempts, const AutomaticFitTrial* best,
                         const AutomaticFitOptions& options) {
-  constexpr double kAll = 0.95;  // of the work of all attempts; what follows them takes the rest
+  constexpr double kPortionOfAllAttempts = 0.95;  // of the work; what follows them takes the rest
   const auto cells_of = [](const AutomaticAttempt& attempt) {
     return static_cast<double>(cells_after(attempt.template_cells, attempt.levels));
   };
@@ -86,7 +86,7 @@ double expected_portion(std::span<const AutomaticAttempt> attempts, const Automa
     if (cells_of(attempt) >= needed) break;
   }
   if (!best && std::ranges::none_of(attempts, [&](const auto& a) { return cells_of(a) >= needed; })) work = first;
-  return kAll * first / work;
+  return kPortionOfAllAttempts * first / work;
 }
 
 }  // namespace subvol::internal

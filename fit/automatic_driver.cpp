@@ -29,10 +29,11 @@ double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kA
 
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
   // The share for a grid of cubes. For a grid through planes, it is smaller in proportion to the shortest edge.
-  constexpr double kLeast = 0.1;
-  constexpr double kFlat = 0.4;  // lines of grids through planes are no closer than this share of the others
+  constexpr double kLeastCubeEdgeShare = 0.1;
+  // Lines of grids through planes are no closer than this share of the others.
+  constexpr double kLeastLineSpacing = 0.4;
   if (grid.num_cells() == 0) return 0;
-  double shortest = kFlat;
+  double shortest = kLeastLineSpacing;
   for (std::size_t c = 0; c < grid.num_cells(); ++c) {
     const CellTopology& cell = cell_topology(grid.kinds[c]);
     const auto vertices = grid.cell(c);
@@ -41,7 +42,7 @@ double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
       shortest = std::min(shortest, (b - a).norm() / lengths[c].maxCoeff());
     }
   }
-  return kLeast * shortest / kFlat;
+  return kLeastCubeEdgeShare * shortest / kLeastLineSpacing;
 }
 
 TriangleMesh sheet_triangles(const VolumeMesh& mesh, const MeshTopology& topology,
@@ -171,13 +172,13 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
 /// cells farther out, until there are none: there the cells take the room that they want, as on the grid. Returns false
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
-  constexpr int kMostRounds = 12, kSteps = 6;  // the steps of each round
+  constexpr int kMostRelaxationRounds = 12, kRelaxationSteps = 6;  // steps of each round
   constexpr int kFruitless = 4;  // rounds without fewer hopeless cells: no success was seen after two
-  constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
+  constexpr double kFirstSurfaceWeight = 10, kSurfaceWeightFactor = 0.1;  // factor from one round to the next
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
-  double surface = kFirst;
+  double surface = kFirstSurfaceWeight;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (int round = 0, fruitless = 0; round < kMostRounds; ++round, surface *= kLess) {
+  for (int round = 0, fruitless = 0; round < kMostRelaxationRounds; ++round, surface *= kSurfaceWeightFactor) {
     const std::vector<Index> cells = hopeless_cells(round > 0 || meets_itself(result_.trials.back()));
     if (runner_.is_to_end()) {
       note_end_in("the relaxation of hopeless cells");
@@ -190,7 +191,7 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
     const int rings = 1 + round / 2;
     const std::vector<Vec3> before = unknowns();
     const bool going =
-        stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, unknowns(), result_.report);
+        stages.relax(cells, rings, {surface, weights, kRelaxationSteps}, runner_, record, unknowns(), result_.report);
     follow_cage();
     if (!going) return false;
     if (unknowns() == before) break;  // the patches would be most of the mesh
@@ -214,9 +215,10 @@ bool AutomaticDriver::relax_last_trial() {
 }
 
 bool AutomaticDriver::polish() {
-  constexpr double kStep = 0.05;  // by which the least scaled Jacobian asked for rises from one lift to the next
+  // By which the least scaled Jacobian asked for rises from one lift to the next.
+  constexpr double kPolishQualityStep = 0.05;
   // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
-  constexpr double kGrowth = 1.2, kLeast = 0.02;
+  constexpr double kPolishDistanceGrowth = 1.2, kPolishToleranceShare = 0.02;
   // If more than this share of the cells is below a quality, lifting them moves most of the mesh. A vertex of a cage
   // moves more cells.
   constexpr double kMostPoor = 0.1, kMostPoorOfCage = 0.05;
@@ -226,10 +228,12 @@ bool AutomaticDriver::polish() {
   AutomaticFitTrial trial = best();
   trial.is_polished = true;
   const double tolerance = options_.max_tolerance_percent;
-  const double most_percent = std::clamp(kGrowth * trial.max_percent, kLeast * tolerance, tolerance);
+  const double most_percent =
+      std::clamp(kPolishDistanceGrowth * trial.max_percent, kPolishToleranceShare * tolerance, tolerance);
   bool going = true, reached = true, is_lifted = false;
-  for (int i = 1; going && reached && options_.quality + i * kStep < kMostQuality + kStep / 2; ++i) {
-    const double goal = std::min(options_.quality + i * kStep, kMostQuality);
+  for (int i = 1; going && reached && options_.quality + i * kPolishQualityStep < kMostQuality + kPolishQualityStep / 2;
+       ++i) {
+    const double goal = std::min(options_.quality + i * kPolishQualityStep, kMostQuality);
     const std::vector<double> least = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const auto poor = std::ranges::count_if(least, [goal](double quality) { return quality < goal; });
     const double most = (cage_ ? kMostPoorOfCage : kMostPoor) * static_cast<double>(least.size());

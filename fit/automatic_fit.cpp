@@ -38,11 +38,11 @@ using namespace internal;
 
 namespace {
 
-constexpr double kMostGrowth = 1.5;  // of the number of cells by cutting some of them
+constexpr double kMostRefinementGrowth = 1.5;  // of the number of cells, by cutting some of them
 /// Largest share of the cells allowed that a template may have if some of its cells are to be cut.
 constexpr double kMostShareOfGrid = 0.75;
 /// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest.
-constexpr int kMostRefinements = 2;
+constexpr int kMostRefinementRounds = 2;
 /// Largest number of routings of one grid. Each gives up edges at which the one before left poor cells.
 constexpr int kMostRoutings = 5;
 /// Numbers of cells, as shares of that of the first grid, of other grids on which edges are laid out. Whether a long
@@ -82,12 +82,13 @@ class AutomaticFit : AutomaticSolidDriver {
     return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
   /// Number of cells up to which a fit is refined, if the number is free.
-  static double most_refined_cells() { return kMostGrowth * static_cast<double>(kAutomaticCells.back()); }
+  static double most_refined_cells() { return kMostRefinementGrowth * static_cast<double>(kAutomaticCells.back()); }
   /// More cells are tried on a surface without edges as long as an aim is missed at all: they cost little there.
   bool is_strict() const { return !follows_.any() && !options_.makes_cage; }
   bool ends_search() const {
-    constexpr double kNearlyAll = 0.95;  // of the quality: what is left is worth no more cells
-    return is_good() && (!is_strict() || (meets_distances(best(), options_) && best().least_share >= kNearlyAll));
+    constexpr double kNearlyAllQuality = 0.95;  // of the quality: what is left is worth no more cells
+    return is_good() &&
+           (!is_strict() || (meets_distances(best(), options_) && best().least_share >= kNearlyAllQuality));
   }
   void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
@@ -213,10 +214,11 @@ bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
   // A grid is first asked for this share of the cells allowed, since pads add cells; after a grid that was too large,
-  // the next one is asked for kLess of what would have fitted.
-  constexpr double kRoomForPads = 0.5, kLess = 0.95;
-  constexpr double kEnough = 0.8;  // share of the edges that must find a path, or a finer grid is worth more than a fit
-  constexpr int kTries = 3;        // grids
+  // the next one is asked for kNextPaddedGridShare of what would have fitted.
+  constexpr double kRoomForPads = 0.5, kNextPaddedGridShare = 0.95;
+  // Share of the edges that must find a path, or a finer grid is worth more than a fit.
+  constexpr double kLeastRoutedShare = 0.8;
+  constexpr int kTries = 3;  // grids
   double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
     std::optional<AutoTemplate> grid = make_grid(attempt.kind, asked);
@@ -227,10 +229,10 @@ bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
     const std::size_t padded = layout_->patched.mesh.num_cells();
     const bool is_least = asked <= static_cast<double>(kLeastTemplateCells);
     if (padded > attempt.template_cells && options_.cells && trial < kTries && !is_least) {
-      asked *= kLess * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
+      asked *= kNextPaddedGridShare * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
-    if (!attempt.is_last_count && routed_share(layout_->routing, edges_.features.curves) < kEnough) {
+    if (!attempt.is_last_count && routed_share(layout_->routing, edges_.features.curves) < kLeastRoutedShare) {
       skipped_.push_back(attempt);
       return true;
     }
@@ -282,7 +284,7 @@ bool AutomaticFit::run_graded() {
 bool AutomaticFit::run_refined() {
   const AutomaticFitTrial before = best();
   const double most =
-      options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(before.cells);
+      options_.cells ? static_cast<double>(*options_.cells) : kMostRefinementGrowth * static_cast<double>(before.cells);
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> refined =
       refined_at_faults(result_.mesh, best_start_.sizes, faults_of_best(), static_cast<std::size_t>(most), &stop);
@@ -347,7 +349,7 @@ AutomaticFitResult AutomaticFit::run() {
     begin_attempt();
     going = run_graded();
   }
-  for (int round = 0; going && is_worth_refining() && round < kMostRefinements; ++round) {
+  for (int round = 0; going && is_worth_refining() && round < kMostRefinementRounds; ++round) {
     const std::size_t before = result_.chosen;
     begin_attempt();
     going = run_refined();

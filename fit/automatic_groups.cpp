@@ -45,8 +45,8 @@ void add(AutomaticFitResult& result, const AutomaticFitResult& other, bool befor
 /// Returns what missed groups add to the merit of a trial: ten of them weigh as much as a fifth of the quality aimed
 /// at.
 double cost_of_missed(std::size_t groups) {
-  constexpr double kOfOne = 0.1, kMost = 1;
-  return std::min(kMost, kOfOne * static_cast<double>(groups));
+  constexpr double kMissedGroupCost = 0.1, kMostMissedGroupsCost = 1;
+  return std::min(kMostMissedGroupsCost, kMissedGroupCost * static_cast<double>(groups));
 }
 
 /// Returns true if a result is to be preferred to another one that misses so many groups.

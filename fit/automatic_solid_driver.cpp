@@ -30,10 +30,10 @@ constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a
 void AutomaticSolidDriver::find_edges() {
   if (!follows_.any()) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
-  constexpr double kNone = 180;  // no edge is sharper
+  constexpr double kNoCreaseAngle = 180;  // no edge is sharper
   std::vector<std::array<Index, 2>> borders;
   if (options_.keeps_groups) borders = group_borders(edges_.mesh, original_);
-  const double angle = follows_.sharp ? *options_.crease_angle_degrees : kNone;
+  const double angle = follows_.sharp ? *options_.crease_angle_degrees : kNoCreaseAngle;
   edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, angle, borders));
   facets_ = flat_facets(target_.mesh);
 }
@@ -41,8 +41,8 @@ void AutomaticSolidDriver::find_edges() {
 void AutomaticSolidDriver::find_features() {
   // Larger targets are not sampled more densely. Their features may be missed if they are smaller than the spacing of
   // so many samples, 0.2 % of the root of the area.
-  constexpr std::size_t kMostSamples = 200'000;
-  target_.sample(0, kLeastTargetSamples, kMostSamples);
+  constexpr std::size_t kMostFeatureSamples = 200'000;
+  target_.sample(0, kLeastTargetSamples, kMostFeatureSamples);
   const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
   features_ = feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2),
                             most, [this] { return runner_.is_to_end(); });
@@ -72,8 +72,8 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOpti
 }
 
 std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::size_t cells) {
-  constexpr int kTries = 3;       // grids
-  constexpr double kLess = 0.97;  // after a grid that was too large, share of what would have fitted
+  constexpr int kTries = 3;                    // grids
+  constexpr double kNextTemplateShare = 0.97;  // after a grid that was too large, share of what would have fitted
   double asked = kRoomForTemplates * static_cast<double>(cells);
   std::optional<AutoTemplate> smallest;
   for (int trial = 1;; ++trial) {
@@ -87,7 +87,7 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::
     const std::size_t got = made->mesh.num_cells();
     if (!smallest || got < smallest->mesh.num_cells()) smallest = std::move(made);
     if (got <= cells || count == kLeastTemplateCells || trial == kTries) return smallest;
-    asked *= kLess * static_cast<double>(cells) / static_cast<double>(got);
+    asked *= kNextTemplateShare * static_cast<double>(cells) / static_cast<double>(got);
   }
 }
 

@@ -159,7 +159,7 @@ bool SubdivisionFit::raise_quality() {
 
 /// Makes flat interfaces exactly so, unless the cells suffer. Returns false if the fit must end.
 bool SubdivisionFit::flatten_interfaces() {
-  constexpr double kLeastShare = 0.98;  // of the least scaled Jacobian
+  constexpr double kLeastFlattenedJacobianShare = 0.98;  // of the least scaled Jacobian
   if (!target_.has_interfaces()) return true;
   const std::optional<Measured> before = measure();
   if (!before) return false;
@@ -171,7 +171,7 @@ bool SubdivisionFit::flatten_interfaces() {
   mean_.reset();
   const std::optional<Measured> now = measure();
   if (now && now->uncertified <= before->uncertified && now->pairs <= before->pairs &&
-      now->least_jacobian >= kLeastShare * before->least_jacobian)
+      now->least_jacobian >= kLeastFlattenedJacobianShare * before->least_jacobian)
     return true;
   go_back(std::move(start));
   return now.has_value();

@@ -315,8 +315,8 @@ void check_options(const CertificateOptions& options) {
 }
 
 const char* to_string(CellValidity validity) {
-  constexpr const char* kNames[] = {"valid", "invalid", "undecided"};
-  return kNames[static_cast<int>(validity)];
+  constexpr const char* kValidityNames[] = {"valid", "invalid", "undecided"};
+  return kValidityNames[static_cast<int>(validity)];
 }
 
 CellCertificate certify_cell(CellKind kind, std::span<const Vec3> corners, const CertificateOptions& options) {

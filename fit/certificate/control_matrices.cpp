@@ -18,7 +18,7 @@ namespace subvol::internal {
 namespace {
 
 /// Number of vectors of matrices taken in between two tests for positive definiteness.
-constexpr std::size_t kBlock = 4;
+constexpr std::size_t kVectorsPerDefinitenessTest = 4;
 
 /// Approximates the transposed rotation of m's polar decomposition by Newton's iteration, scaled while far from it
 /// (Higham). The closer m is to a singular matrix, the smaller the error. The result times m is symmetric.
@@ -50,8 +50,8 @@ Mat3 unrotate(const Mat3& m) {
 /// frame: null for none.
 template <class Matrices>
 Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3* frame) {
-  constexpr std::size_t kMost = 4;  // vectors in the sample; more make little difference (measured)
-  const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
+  constexpr std::size_t kMostSampledVectors = 4;  // more make little difference (measured)
+  const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMostSampledVectors);
   using Vector = typename Matrices::Vector;
   using Number = NumberOf<Vector>;
   // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): only of doubles is it a copy
@@ -82,19 +82,19 @@ Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation,
 
 /// Returns c, with product 1. lengths: those of the columns of M frame.
 Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
-  constexpr double kLeast = 0.01;  // squared share of the lengths; smaller variation does not count
-  const Mat3 v = variation + kLeast * Vec3::Ones() * lengths.cwiseAbs2().transpose();
+  constexpr double kLeastSquaredVariation = 0.01;  // squared share of the lengths; smaller variation does not count
+  const Mat3 v = variation + kLeastSquaredVariation * Vec3::Ones() * lengths.cwiseAbs2().transpose();
   const double by_01 = v(0, 1) / v(1, 0), by_02 = v(0, 2) / v(2, 0), by_12 = v(1, 2) / v(2, 1);
   const double first = std::cbrt(std::sqrt(by_01 * by_02)), second = std::cbrt(std::sqrt(by_12 / by_01));
   return {first, second, 1 / (first * second)};
 }
 
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+constexpr std::size_t kNoMatrix = static_cast<std::size_t>(-1);
 
 struct Bound {
-  double value;                    ///< lower bound of det J; 0: none
-  bool is_final;                   ///< true if no other L needs to be tried: a bound was found, or none exists
-  std::size_t in_the_way = kNone;  ///< number b of an S_b that is not positive definite, if one is known
+  double value;                        ///< lower bound of det J; 0: none
+  bool is_final;                       ///< true if no other L needs to be tried: a bound was found, or none exists
+  std::size_t in_the_way = kNoMatrix;  ///< number b of an S_b that is not positive definite, if one is known
 };
 
 template <class Vector>
@@ -125,13 +125,13 @@ Vec3 near_least_eigenvector(const Mat3& s) {
 /// eigenvector, of any length: then v^T L J_b D v = margin v^T v. This is one step of the perceptron algorithm for an L
 /// that suits all b.
 Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
-  constexpr double kMargin = 0.06;  // relative to L's largest entry
+  constexpr double kPerceptronMargin = 0.06;  // relative to L's largest entry
   l *= 1 / l.cwiseAbs().maxCoeff();
   const Mat3 product = l * scaled_matrix;
   const Vec3 v = near_least_eigenvector(0.5 * (product + product.transpose()));
   const double least = std::min(0.0, v.dot(product * v) / v.squaredNorm());
   const Vec3 w = scaled_matrix * v;
-  return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
+  return l + (kPerceptronMargin - least) / w.squaredNorm() * v * w.transpose();
 }
 
 /// Lowest leading minors and largest entries of many symmetric matrices 2 T_b, T_b = sym(m_b) - diag(shift).
@@ -165,15 +165,15 @@ class Extremes {
   }
   /// Returns a lower bound of det S_b, S_b = D T_b D, if all are certainly positive definite; else 0. scale: D.
   double determinant(const Vec3& scale) const {
-    constexpr double kRoundoff = std::numeric_limits<Number>::epsilon() / 2;
+    constexpr double kNumberRoundoff = std::numeric_limits<Number>::epsilon() / 2;
     const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes_[e]) * scale[i] * scale[k]; };
     const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
                                      scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
     const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
     // A second minor has products of two entries with at most 3 roundings each, a third minor six of three with 5 or 6.
-    const double least = to_third * lowest_lane(third_) - 100 * kRoundoff * largest * largest * largest;
+    const double least = to_third * lowest_lane(third_) - 100 * kNumberRoundoff * largest * largest * largest;
     return largest < 1e30 && lowest_lane(first_) > 0 &&
-                   to_second * lowest_lane(second_) > 9 * kRoundoff * largest * largest && least > 0
+                   to_second * lowest_lane(second_) > 9 * kNumberRoundoff * largest * largest && least > 0
                ? least / 8
                : 0;
   }
@@ -197,28 +197,28 @@ Bound failed_at(std::size_t begin, const MatrixOf<Vector>& m, const Extremes<Vec
 }
 
 /// Takes in the T_b of `count` matrices. Stops at, and returns, the number of one that is not positive definite; else
-/// kNone.
+/// kNoMatrix.
 template <class Vector, class Product>
 std::size_t take_until_failure(const Product& product, std::size_t count, const Vec3& shift,
                                Extremes<Vector>& extremes) {
-  constexpr std::size_t kLanes = sizeof(Vector) / sizeof(Vector{}[0]);
+  constexpr std::size_t kVectorLanes = sizeof(Vector) / sizeof(Vector{}[0]);
   MatrixOf<Vector> m;
-  const auto place = [&](std::size_t b) { return std::min(b, count - kLanes); };  // the last vector may overlap
-  for (std::size_t block = 0; block < count; block += kBlock * kLanes) {
-    const std::size_t end = std::min(count, block + kBlock * kLanes);
-    for (std::size_t b = block; b < end; b += kLanes) {
+  const auto place = [&](std::size_t b) { return std::min(b, count - kVectorLanes); };  // the last vector may overlap
+  for (std::size_t block = 0; block < count; block += kVectorsPerDefinitenessTest * kVectorLanes) {
+    const std::size_t end = std::min(count, block + kVectorsPerDefinitenessTest * kVectorLanes);
+    for (std::size_t b = block; b < end; b += kVectorLanes) {
       product.load(place(b), m);
       extremes.take(m);
     }
     if (extremes.are_positive()) continue;
-    for (std::size_t b = block; b < end; b += kLanes) {
+    for (std::size_t b = block; b < end; b += kVectorLanes) {
       Extremes<Vector> own(shift);
       product.load(place(b), m);
       own.take(m);
       if (!own.are_positive()) return place(b) + lowest_place(own.lowest_minor());
     }
   }
-  return kNone;
+  return kNoMatrix;
 }
 
 /// Twice the amount to subtract from the diagonal of S_b if |error of L J D| <= g.
@@ -261,7 +261,7 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
     if (!(product.errors().maxCoeff() <= kMostError && more.maxCoeff() <= kMostShift)) return 0;
     Extremes<typename Matrices::NarrowProduct::Vector> extremes(more);
     in_the_way = take_until_failure(product, matrices.size(), more, extremes);
-    return in_the_way == kNone ? extremes.determinant(scale) : 0;
+    return in_the_way == kNoMatrix ? extremes.determinant(scale) : 0;
   }
 }
 
@@ -287,7 +287,7 @@ Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOp
   // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): only of doubles is it a copy
   const Eigen::Matrix<NumberOf<Vector>, 3, 3> factors = unscaled.template cast<NumberOf<Vector>>();
   const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
-    if (b == kNone) return {};
+    if (b == kNoMatrix) return {};
     const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
     MatrixOf<Vector> m;
     matrices.load(begin, m);
@@ -301,10 +301,10 @@ Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOp
     return Bound{determinant * (1 - 1e-11) * scaling.lengths.prod() / l_determinant, true};
   };
   if (const auto fails = failed_near(in_the_way)) return *fails;
-  if (in_the_way != kNone || options.corners_first)
+  if (in_the_way != kNoMatrix || options.corners_first)
     for (const std::size_t corner : matrices.corners())
       if (const auto fails = failed_near(corner)) return *fails;
-  in_the_way = kNone;
+  in_the_way = kNoMatrix;
   constexpr bool kHasDouble = requires { matrices.times(unscaled); };
   if (options.single_first || !kHasDouble) {
     if (const double determinant = narrow_bound(matrices, unscaled, shift, scaling, in_the_way); determinant > 0)
@@ -315,7 +315,7 @@ Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOp
   if constexpr (kHasDouble) {
     Extremes<Wide> extremes(unscaled_shift);
     in_the_way = take_until_failure(matrices.times(unscaled), count, unscaled_shift, extremes);
-    if (in_the_way != kNone) return failed_near(in_the_way).value_or(Bound{0, false});
+    if (in_the_way != kNoMatrix) return failed_near(in_the_way).value_or(Bound{0, false});
     if (const double determinant = extremes.determinant(scaling.scale); determinant > 0) return bound(determinant);
   }
   return {0, false};
@@ -346,7 +346,7 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   // This also rejects a column that is 0 or not finite.
   if (!((mean * inverse_lengths.asDiagonal()).determinant() > 1e-12)) return 0;
   const Scaling scaling(mean, lengths, remainder);
-  const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
+  const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNoMatrix) {
     if (near_l) *near_l = l;
     return bound_by(l, scaling, matrices, options, in_the_way);
   };
@@ -374,7 +374,7 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   const double size = std::cbrt(framed.determinant());
   Mat3 l = from_frame(c, unrotate(framed * (c / size).asDiagonal()));
   result = bound(l, result.in_the_way);
-  for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNone; ++turn) {
+  for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNoMatrix; ++turn) {
     l = turned(l, matrices[result.in_the_way] * inverse_lengths.asDiagonal());
     result = bound(l, result.in_the_way);
   }

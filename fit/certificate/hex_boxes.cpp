@@ -18,8 +18,9 @@ constexpr double kHopelessError = 0.55;
 /// Largest number of boxes, per precision, that keep their coefficients (15 KB, 8 KB) until they are bisected.
 constexpr int kMostKept = 64;
 
-// Model errors may be at most kShare * min(lowest det J, kGood), with det J relative to the cell's mean determinant.
-constexpr double kShare = 0.1, kGood = 0.5;
+// Model errors may be at most kModelErrorShare * min(lowest det J, kGoodHexDeterminant), with det J relative to the
+// cell's mean determinant.
+constexpr double kModelErrorShare = 0.1, kGoodHexDeterminant = 0.5;
 
 /// 1 for those of the first kWide entries of a matrix, stored by columns, that belong to the column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
@@ -71,9 +72,9 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   make_weights();
   contraction_.take_steps();
   // Products of three such numbers are still within single precision, which ends at 1e-38 and 1e38.
-  constexpr double kMost = 1e10;
+  constexpr double kMostSinglePrecisionTotal = 1e10;
   const double total = contraction_.total().maxCoeff();
-  fits_single_ = total < kMost && total > 1 / kMost;
+  fits_single_ = total < kMostSinglePrecisionTotal && total > 1 / kMostSinglePrecisionTotal;
 }
 
 /// Bounds |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i| and |sum_i x_i N_i'| <= |x_1 - x_0| + ...
@@ -234,7 +235,7 @@ bool HexBoxes::improve(Box& box, double lowest, bool is_last) {
   const Mat3 mean = narrow_matrices_.mean();
   const Vec3 lengths = mean.colwise().norm().transpose();
   const bool is_looked_at = lengths.maxCoeff() < kMostScale * lengths.minCoeff();
-  const double allowed = kShare * std::min(lowest / mean_edges_.prod(), kGood);
+  const double allowed = kModelErrorShare * std::min(lowest / mean_edges_.prod(), kGoodHexDeterminant);
   if (is_looked_at && !is_last && narrow_error_size(box) <= allowed) return false;
   box.is_precise = true;
   box.narrow.reset();
@@ -250,9 +251,10 @@ double HexBoxes::narrow_error_size(const Box& box) const {
 
 std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
   // Least error that is asked for, and the share of the error allowed that single precision may use up.
-  constexpr double kLeast = 1e-9, kNarrowShare = 0.25;
+  constexpr double kLeastModelError = 1e-9, kNarrowShare = 0.25;
   if (lowest != -std::numeric_limits<double>::infinity())
-    box.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
+    box.wanted =
+        std::max(kModelErrorShare * std::min(lowest / mean_edges_.prod(), kGoodHexDeterminant), kLeastModelError);
   const bool was_whole = box.level == 0;
   bool keeps = has_coefficients(box) && !was_whole;
   for (int d = 0; d < 3; ++d) keeps = keeps && error_size(box, d) <= box.wanted;
@@ -315,9 +317,9 @@ Mat3 HexBoxes::remainder(const Box& box) {
   }
   // Roundings: three contractions of n_ terms, tables accurate to 4 roundings each, the shift, the steps, bisections,
   // L, differences, and the 16 that `determinant_bound` requires. Steps of steps inherit the roundings of the steps
-  // they are computed from: kSteps of the total in all.
-  constexpr int kSteps = 13;
-  const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
+  // they are computed from: kStepRoundings of the total in all.
+  constexpr int kStepRoundings = 13;
+  const double roundings = 3 * (n_ + 4) + 1 + kStepRoundings + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
   for (int d = 0; d < 3; ++d) {
     result.col(d) *= 1 / parts(box.levels[d]);

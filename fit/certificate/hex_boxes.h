@@ -60,7 +60,8 @@ class HexBoxes {
     CoefficientsPool<Narrow>::Pooled narrow;
   };
   // Three bisections, one in each direction, make a depth. There are no models of deeper parts.
-  static constexpr int kLevelsPerDepth = 3, kMaxDepth = LineModels::kMaxLevel;
+  static constexpr int kLevelsPerDepth = 3, kMostHexDepth = LineModels::kMaxLevel;
+  static constexpr int max_depth() { return kMostHexDepth; }
 
   HexBoxes(Basis basis, int order);
 
@@ -165,7 +166,7 @@ class HexBoxes {
   bool fits_single_ = true;                      // false if the cell's size may overflow or underflow there
   std::size_t cell_ = 0;                         // number of the current cell, from 1
   using Zones = std::array<LineError, LineModels::kZones>;
-  std::array<std::array<std::array<Zones, HexContraction::kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
+  std::array<std::array<std::array<Zones, HexContraction::kMostHexTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
   LineModels::PerFunction bounds_, slope_bounds_;  // of N_i and N_i'
   // In lanes: bounds of N_i from i = 2 on, of their slopes, and the inverses of both.
   AlignedDoubles mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;

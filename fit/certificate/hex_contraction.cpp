@@ -69,17 +69,17 @@ template <Of of, class Number>
 void contract(int num_out, const Number* table, const Lines<Number>& in, const Number* more, Number* out,
               int out_stride) {
   using Contract = void (*)(const Number*, const Lines<Number>&, const Number*, Number*, int);
-  static constexpr Contract kAll[] = {nullptr,
-                                      contract_to<1, of, false, Number>,
-                                      contract_to<2, of, false, Number>,
-                                      contract_to<3, of, false, Number>,
-                                      contract_to<4, of, false, Number>,
-                                      contract_to<5, of, false, Number>,
-                                      contract_to<6, of, false, Number>,
-                                      contract_to<7, of, false, Number>,
-                                      contract_to<8, of, false, Number>,
-                                      contract_to<9, of, false, Number>};
-  kAll[num_out](table, in, more, out, out_stride);
+  static constexpr Contract kContractionsByCount[] = {nullptr,
+                                                      contract_to<1, of, false, Number>,
+                                                      contract_to<2, of, false, Number>,
+                                                      contract_to<3, of, false, Number>,
+                                                      contract_to<4, of, false, Number>,
+                                                      contract_to<5, of, false, Number>,
+                                                      contract_to<6, of, false, Number>,
+                                                      contract_to<7, of, false, Number>,
+                                                      contract_to<8, of, false, Number>,
+                                                      contract_to<9, of, false, Number>};
+  kContractionsByCount[num_out](table, in, more, out, out_stride);
 }
 
 /// out[i out_stride], lane p, = more[i] + c in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n; c is the weight
@@ -99,8 +99,8 @@ void contract_to_lanes(const NumberOf<Vector>* table, const NumberOf<Vector>* in
   }
 }
 
-constexpr double kNoMore[LineModels::kMaxDegree + 2] = {};
-constexpr float kNoNarrowMore[LineModels::kMaxDegree + 2] = {};
+constexpr double kNoMore[LineModels::kMostModelDegree + 2] = {};
+constexpr float kNoNarrowMore[LineModels::kMostModelDegree + 2] = {};
 
 }  // namespace
 

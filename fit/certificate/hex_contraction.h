@@ -35,7 +35,7 @@ struct HexPart {
 /// by the same sums of absolute values, with max_q |d_kq|, max_q |b_kq| and |c_k|.
 class HexContraction {
  public:
-  static constexpr int kMostTiers = 2;      // models of two degrees (`model_degrees`)
+  static constexpr int kMostHexTiers = 2;   // models of two degrees (`model_degrees`)
   static constexpr int kRow = kWideFloats;  ///< rows are padded to a multiple of this
 
   HexContraction(Basis basis, int order);

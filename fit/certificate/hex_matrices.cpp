@@ -137,7 +137,7 @@ Mat3 HexMatricesOf<Vector>::mean() const {
 
 template <class Vector>
 Mat3 HexMatricesOf<Vector>::variation() const {
-  constexpr Vector kInside{1, 1, 1, 1, 1, 1, 0, 0};  // lanes with two more after them
+  constexpr Vector kLanesBeforeLastTwo{1, 1, 1, 1, 1, 1, 0, 0};
   const int degree_u = num_u_ - 1, degree_v = kWide - 1, degree_w = num_w_ - 1;
   Vector uu{}, vv{}, ww{}, uv{}, uw{}, vw{};
   for (int row = 0; row < 3; ++row)
@@ -148,7 +148,7 @@ Mat3 HexMatricesOf<Vector>::variation() const {
         uv += size_of(shifted_down(step_u) - step_u);
         vw += size_of(shifted_down(step_w) - step_w);
         uw += size_of(x[num_w_ + 1] - x[1] - step_u);
-        vv += size_of(kInside * (shifted_down(step_v) - step_v));
+        vv += size_of(kLanesBeforeLastTwo * (shifted_down(step_v) - step_v));
         if (u + 2 <= degree_u) uu += size_of(x[2 * num_w_] - x[num_w_] - step_u);
         if (w + 2 <= degree_w) ww += size_of(x[2] - x[1] - step_w);
       }
@@ -182,8 +182,8 @@ HexMatrices::Product HexMatrices::times(const Mat3& l) {
 Vec3 NarrowHexMatrices::entry_errors(const NarrowHexCoefficients::Precision& precision) {
   // An entry sums q differences of two numbers, with their own errors and 4 roundings each (those of L and the
   // product), one rounding for each of three operations with them, and two more for what is computed from entries.
-  constexpr double kDegree = kWide - 1, kRoundings = 18 * kDegree;
-  return 2 * kDegree * precision.errors + kRoundings * kNarrowRoundoff * precision.sizes;
+  constexpr double kMostHexDegree = kWide - 1, kRoundings = 18 * kMostHexDegree;
+  return 2 * kMostHexDegree * precision.errors + kRoundings * kNarrowRoundoff * precision.sizes;
 }
 
 NarrowHexMatrices::NarrowProduct NarrowHexMatrices::narrow_product(const Mat3& l) {

@@ -20,16 +20,16 @@ inline constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() 
 template <class Vector>
 class HexCoefficientsOf {
  public:
-  static constexpr int kMost = kWide;  ///< largest num_u and num_w; the smallest is 2
-  static constexpr int kMargin = kWide;
+  static constexpr int kMostCoefficientsPerDirection = kWide;  ///< largest num_u and num_w; the smallest is 2
+  static constexpr int kMarginVectors = kWide;
 
   void resize(int num_u, int num_w) { num_u_ = num_u, num_w_ = num_w; }
   int num_u() const { return num_u_; }
   int num_w() const { return num_w_; }
   int num_vectors() const { return num_u_ * num_w_; }
-  /// Coefficients of x, y or z. The kMargin vectors on either side can be read and are finite.
-  Vector* coordinate(int row) { return x_[row].data() + kMargin; }
-  const Vector* coordinate(int row) const { return x_[row].data() + kMargin; }
+  /// Coefficients of x, y or z. The kMarginVectors on either side can be read and are finite.
+  Vector* coordinate(int row) { return x_[row].data() + kMarginVectors; }
+  const Vector* coordinate(int row) const { return x_[row].data() + kMarginVectors; }
 
   /// For single precision, by rows: bounds on the coefficients' errors due to it, and on their size when they were
   /// computed. Bisected coefficients are no larger, apart from rounding.
@@ -44,7 +44,8 @@ class HexCoefficientsOf {
 
  private:
   int num_u_ = 0, num_w_ = 0;
-  alignas(WideFloats) std::array<std::array<Vector, kMost * kMost + 2 * kMargin>, 3> x_{};
+  alignas(WideFloats) std::array<
+      std::array<Vector, kMostCoefficientsPerDirection * kMostCoefficientsPerDirection + 2 * kMarginVectors>, 3> x_{};
 };
 using HexCoefficients = HexCoefficientsOf<Wide>;
 /// Coefficients in single precision, relative to a nearby point.
@@ -86,7 +87,8 @@ class HexMatricesOf {
   void load(const Coefficients& of, std::size_t first, MatrixOf<Vector>& result) const;
 
   using Number = NumberOf<Vector>;
-  static constexpr int kMostVectors = Coefficients::kMost * Coefficients::kMost;
+  static constexpr int kMostVectors =
+      Coefficients::kMostCoefficientsPerDirection * Coefficients::kMostCoefficientsPerDirection;
   /// Weights of the differences.
   struct Weights {
     /// For each vector: o and q - o along u, and along w.
@@ -98,13 +100,14 @@ class HexMatricesOf {
   const Weights* weights_ = nullptr;  // for these sizes
 
  private:
-  std::array<std::array<std::unique_ptr<const Weights>, Coefficients::kMost + 1>, Coefficients::kMost + 1>
+  std::array<std::array<std::unique_ptr<const Weights>, Coefficients::kMostCoefficientsPerDirection + 1>,
+             Coefficients::kMostCoefficientsPerDirection + 1>
       all_weights_;
 };
 
 template <class Vector>
 void HexMatricesOf<Vector>::load(const Coefficients& of, std::size_t first, MatrixOf<Vector>& result) const {
-  constexpr Vector kLowV{0, 1, 2, 3, 4, 5, 6, 7}, kHighV = kWide - 1 - kLowV;
+  constexpr Vector kLowWeightsV{0, 1, 2, 3, 4, 5, 6, 7}, kHighWeightsV = kWide - 1 - kLowWeightsV;
   const std::size_t vector = first / kWide;
   const int num_w = of.num_w();
   const auto [low_u, high_u, low_w, high_w] = weights_->of[vector];
@@ -112,7 +115,7 @@ void HexMatricesOf<Vector>::load(const Coefficients& of, std::size_t first, Matr
     const Vector* x = of.coordinate(row) + vector;
     const Vector here = *x, step = shifted_down(here) - here;
     result[row][0] = low_u * (here - x[-num_w]) + high_u * (x[num_w] - here);
-    result[row][1] = kLowV * shifted_up(step) + kHighV * step;
+    result[row][1] = kLowWeightsV * shifted_up(step) + kHighWeightsV * step;
     result[row][2] = low_w * (here - x[-1]) + high_w * (x[1] - here);
   }
 }
@@ -166,7 +169,8 @@ class NarrowHexMatrices : public HexMatricesOf<Narrow> {
 };
 
 inline void NarrowHexMatrices::NarrowProduct::load(std::size_t first, MatrixOf<WideFloats>& result) const {
-  constexpr WideFloats kLowV{0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7}, kHighV = kWide - 1 - kLowV;
+  constexpr WideFloats kLowFloatWeightsV{0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7},
+      kHighFloatWeightsV = kWide - 1 - kLowFloatWeightsV;
   const int next_u = matrices_->num_w_ * kWide;
   const auto& weights = matrices_->weights_->narrow;
   const WideFloats low_u = load_wide(weights[0].data() + first), high_u = load_wide(weights[1].data() + first),
@@ -175,7 +179,7 @@ inline void NarrowHexMatrices::NarrowProduct::load(std::size_t first, MatrixOf<W
     const float* x = numbers(matrices_->product_.coordinate(row)) + first;
     const WideFloats here = load_wide(x);
     result[row][0] = low_u * (here - load_wide(x - next_u)) + high_u * (load_wide(x + next_u) - here);
-    result[row][1] = kLowV * (here - load_wide(x - 1)) + kHighV * (load_wide(x + 1) - here);
+    result[row][1] = kLowFloatWeightsV * (here - load_wide(x - 1)) + kHighFloatWeightsV * (load_wide(x + 1) - here);
     result[row][2] = low_w * (here - load_wide(x - kWide)) + high_w * (load_wide(x + kWide) - here);
   }
 }

@@ -21,7 +21,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
+constexpr double kDoubleRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
 /// One cell: its functions, and its coefficients with signs applied, relative to its first vertex.
 struct Cell {
@@ -47,10 +47,10 @@ EvaluatedMap evaluate(const Cell& cell, const Vec3& point) {
   }
   // Gradient terms are below `size`, accurate to 500 roundings (the sine of 16 pi x); their sum adds one per mode.
   const double size = cell.shapes->kind() == CellKind::hex ? 8 : 8 * cell.order * cell.order;
-  const Vec3 error = size * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * total;
+  const Vec3 error = size * (static_cast<double>(cell.modes.size()) + 500) * kDoubleRoundoff * total;
   const Vec3 rows = jacobian.cwiseAbs().rowwise().sum() + 3 * error;
   const double margin = 3 * (error[0] * rows[1] * rows[2] + error[1] * rows[0] * rows[2]) +
-                        3 * error[2] * rows[0] * rows[1] + 16 * kRoundoff * rows[0] * rows[1] * rows[2];
+                        3 * error[2] * rows[0] * rows[1] + 16 * kDoubleRoundoff * rows[0] * rows[1] * rows[2];
   return {jacobian.determinant(), 2 * margin};
 }
 
@@ -65,7 +65,7 @@ class BoxSearch {
       : boxes_(boxes),
         cell_(cell),
         options_(options),
-        max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, Boxes::kMaxDepth)) {
+        max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, Boxes::max_depth())) {
     result_.lower_bound = kInfinity;
     result_.witness_determinant = kInfinity;
   }

@@ -43,22 +43,24 @@ double log_slope_derivative(Basis basis, int i, int k) {
 /// Returns a close upper bound of |phi_i|: between neighboring samples a function exceeds the larger one by at most
 /// (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
 double largest_integrated_legendre(int i) {
-  constexpr int kSamples = 2000;  // the bound then exceeds the maximum by less than 1e-4
+  constexpr int kLegendreSamples = 2000;  // the bound then exceeds the maximum by less than 1e-4
   long double largest = 0;
-  for (int k = 1; k < kSamples; ++k)
-    largest = std::max(largest, std::abs(mode_value(Basis::legendre, i, static_cast<long double>(k) / kSamples)));
-  return static_cast<double>(largest) + std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kSamples * kSamples);
+  for (int k = 1; k < kLegendreSamples; ++k)
+    largest =
+        std::max(largest, std::abs(mode_value(Basis::legendre, i, static_cast<long double>(k) / kLegendreSamples)));
+  return static_cast<double>(largest) +
+         std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kLegendreSamples * kLegendreSamples);
 }
 
 }  // namespace
 
 const LineModels& LineModels::get(Basis basis, int order, int degree) {
-  assert(order >= 1 && order <= kMaxOrder && degree >= 1 && degree <= kMaxDegree);
+  assert(order >= 1 && order <= kMaxOrder && degree >= 1 && degree <= kMostModelDegree);
   struct Made {
     std::unique_ptr<const LineModels> models;
     std::once_flag once;
   };
-  static std::array<std::array<std::array<Made, kMaxDegree + 1>, kMaxOrder + 1>, 2> all;
+  static std::array<std::array<std::array<Made, kMostModelDegree + 1>, kMaxOrder + 1>, 2> all;
   Made& made = all[static_cast<std::size_t>(basis)][order][degree];
   std::call_once(made.once, [&] { made.models.reset(new LineModels(basis, order, degree)); });
   return *made.models;

@@ -20,7 +20,7 @@ namespace subvol::internal {
 /// largest.
 class LineModels {
  public:
-  static constexpr int kMaxDegree = 8, kMaxLevel = 12;  // of the models; bisections of the line
+  static constexpr int kMostModelDegree = 8, kMaxLevel = 12;  // of the models; bisections of the line
   static constexpr int kStride = 16;  ///< distance from one function's coefficients to the next; unused entries are 0
   using PerFunction = std::array<double, (kMaxOrder + 1 + 7) / 8 * 8>;  ///< padded with zeros to whole vectors
 
@@ -35,7 +35,7 @@ class LineModels {
 
   /// Values stored after the deviations of one function: c, the largest |deviation|, |c|, the largest |b|.
   enum Deviations { kMiddle, kLargestDeviation, kMiddleSize, kLargest };
-  static_assert(kMaxDegree + 1 + kLargest < kStride);
+  static_assert(kMostModelDegree + 1 + kLargest < kStride);
 
   /// The models of all intervals of one level.
   struct Level {
@@ -51,8 +51,9 @@ class LineModels {
     AlignedFloats deviations;
   };
 
-  /// Returns the models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree. They are made once for
-  /// all threads, each level when it is first requested. Cost of a level: about 10 us times 2^level at order 8.
+  /// Returns the models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMostModelDegree. They are made
+  /// once for all threads, each level when it is first requested. Cost of a level: about 10 us times 2^level at
+  /// order 8.
   static const LineModels& get(Basis basis, int order, int degree);
 
   int order() const { return order_; }

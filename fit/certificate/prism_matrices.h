@@ -24,7 +24,7 @@ class PrismMatrices {
   ~PrismMatrices();
   PrismMatrices(PrismMatrices&&) noexcept;
 
-  /// Makes room for coefficients, to be written next. degree: over the triangle, 1 .. SimplexTables::kMaxDegree.
+  /// Makes room for coefficients, to be written next. degree: over the triangle, 1 .. SimplexTables::kMostTableDegree.
   void resize(int degree);
   Wide* coordinate(int row) { return x_[row].data(); }
 

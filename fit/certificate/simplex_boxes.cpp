@@ -14,7 +14,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kFour = SimplexTables::kLanes;
+constexpr std::size_t kFour = SimplexTables::kControlPointLanes;
 using FourDoubles = double __attribute__((vector_size(kFour * sizeof(double))));
 
 FourDoubles load_lanes(const double* from) {
@@ -137,10 +137,10 @@ int SimplexBoxes::choose_tier(const Box& box, const SimplexModels::Part& part, d
     const double across = inverse[0] + inverse[1] + (prism ? 0 : inverse[2]), along = prism ? inverse[2] : 0;
     Wide value{}, gradient{};
     for (const Term& term : layer_terms_[k]) {
-      const double* e = part.errors.data() + 2 * SimplexModels::kMostTiers * term.slot;
+      const double* e = part.errors.data() + 2 * SimplexModels::kMostSimplexTiers * term.slot;
       const double size = term.coefficient.cwiseAbs().sum();
       value += size * load_wide(e);
-      gradient += size * load_wide(e + SimplexModels::kMostTiers);
+      gradient += size * load_wide(e + SimplexModels::kMostSimplexTiers);
     }
     errors += gradient * (across * (prism ? line_.bounds()[k] : 1)) + value * (along * line_.slope_bounds()[k]);
   }
@@ -185,7 +185,7 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
 
   const std::size_t stride = tables(box).stride;
   box.control.assign(stride * lanes_, 0);
-  constexpr int kAtOnce = 4;  // the sums of a single vector would wait for each other
+  constexpr int kVectorSumsAtOnce = 4;  // the sums of a single vector would wait for each other
   for (int k = 0; k < num_layers_; ++k) {
     used_.clear();
     for (const Term& term : layer_terms_[k]) {
@@ -195,7 +195,8 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
     }
     std::size_t first = 0;
     const std::size_t end = stride / kWide;
-    for (; first + kAtOnce <= end; first += kAtOnce) store_sums<kAtOnce>(used_, first, box.control.data() + k);
+    for (; first + kVectorSumsAtOnce <= end; first += kVectorSumsAtOnce)
+      store_sums<kVectorSumsAtOnce>(used_, first, box.control.data() + k);
     for (; first < end; ++first) store_sums<1>(used_, first, box.control.data() + k);
   }
 }
@@ -246,10 +247,11 @@ bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
 
 /// Largest error allowed if the lowest relative det J is this; -infinity: it is unknown.
 double SimplexBoxes::wanted_error(double lowest) const {
-  // The error may be kShare of the lowest determinant, at most of kGood, relative to the cell's mean determinant.
-  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
+  // The error may be kModelErrorShare of the lowest determinant, at most of kGoodSimplexDeterminant, relative to the
+  // cell's mean determinant.
+  constexpr double kModelErrorShare = 0.1, kGoodSimplexDeterminant = 0.3, kLeastModelError = 1e-9;
   if (lowest == -std::numeric_limits<double>::infinity()) return small_error_;
-  return std::max(kShare * std::min(lowest, kGood), kLeast);
+  return std::max(kModelErrorShare * std::min(lowest, kGoodSimplexDeterminant), kLeastModelError);
 }
 
 std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) {

@@ -41,7 +41,8 @@ class SimplexBoxes {
     AlignedDoubles control;           ///< control points: at alpha lanes_ + row num_layers_ + k
   };
   // Three bisections halve all edges. At the greatest depth, these have 1e-6 of their length.
-  static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
+  static constexpr int kLevelsPerDepth = 3, kMostSimplexDepth = 20;
+  static constexpr int max_depth() { return kMostSimplexDepth; }
 
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
   Box root();
@@ -112,7 +113,7 @@ class SimplexBoxes {
  protected:
   const LineModels& line_;  // along w
   int num_layers_;
-  std::size_t lanes_;       // numbers per control point: a multiple of SimplexTables::kLanes
+  std::size_t lanes_;       // numbers per control point: a multiple of SimplexTables::kControlPointLanes
 
  private:
   double small_error_;      // default for the errors of models, relative to the mean edges

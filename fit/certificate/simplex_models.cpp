@@ -187,7 +187,7 @@ std::vector<const SimplexTables*> make_tiers(CellKind kind, Basis basis, int ord
   std::vector<const SimplexTables*> tiers;
   for (const int degree : {3, 5, 7, 9, 11, 14, 17})
     if (degree < highest) tiers.push_back(&SimplexTables::get(dimension, degree));
-  if (tiers.size() == SimplexModels::kMostTiers) tiers.erase(tiers.begin());
+  if (tiers.size() == SimplexModels::kMostSimplexTiers) tiers.erase(tiers.begin());
   tiers.push_back(&SimplexTables::get(dimension, highest));
   return tiers;
 }
@@ -289,7 +289,7 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
       tiers_(make_tiers(kind, basis, order)),
       most_halvings_(most_depth(basis, order) * halvings_between()),
       expansion_(num_nodes(basis, order)) {
-  assert(num_tiers() <= kMostTiers);
+  assert(num_tiers() <= kMostSimplexTiers);
   const int num_vertices = dimension() + 1, num_edges = kind == CellKind::tet ? 6 : 3, n = order - 1;
   const auto add = [&](int edge, int i, int vertex, int j, int k) {
     LocalMode mode;
@@ -408,7 +408,7 @@ SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<con
   };
   std::map<std::array<int, 3>, ProductSizes> pairs;  // V_vertex,j V_3,k
   Part part;
-  part.errors.assign(2 * kMostTiers * modes_.size(), 0);
+  part.errors.assign(2 * kMostSimplexTiers * modes_.size(), 0);
   for (std::size_t slot = 0; slot < modes_.size(); ++slot) {
     const LocalMode& mode = modes_[slot];
     Part::Function f{1, 1, 0};
@@ -431,8 +431,8 @@ SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<con
       f.gradient_bound = steepest * product.bound + largest * product.slope_bound;
       for (int tier = 0; tier < num_tiers(); ++tier) {
         const int degree = tables(tier).index.degree() - size;
-        double& error = part.errors[2 * kMostTiers * slot + tier];
-        double& gradient_error = part.errors[2 * kMostTiers * slot + kMostTiers + tier];
+        double& error = part.errors[2 * kMostSimplexTiers * slot + tier];
+        double& gradient_error = part.errors[2 * kMostSimplexTiers * slot + kMostSimplexTiers + tier];
         if (degree >= 0) {
           const double of_kernel = Sizes::beyond(product.sizes.value, degree);
           error = largest * of_kernel;

@@ -38,7 +38,7 @@ namespace subvol::internal {
 /// unaffected.
 class SimplexModels {
  public:
-  static constexpr int kMostTiers = kWide;
+  static constexpr int kMostSimplexTiers = kWide;
 
   /// Data of the functions over a part that need no models; all by slot.
   struct Part {
@@ -48,10 +48,11 @@ class SimplexModels {
       std::uint8_t left_out;
     };
     std::vector<Function> functions;
-    std::vector<double> errors;  ///< of values at 2 kMostTiers slot + tier; of gradients kMostTiers further on
-    double error(std::size_t slot, int tier) const { return errors[2 * kMostTiers * slot + tier]; }
+    /// Of values at 2 kMostSimplexTiers slot + tier; of gradients kMostSimplexTiers further on.
+    std::vector<double> errors;
+    double error(std::size_t slot, int tier) const { return errors[2 * kMostSimplexTiers * slot + tier]; }
     double gradient_error(std::size_t slot, int tier) const {
-      return errors[2 * kMostTiers * slot + kMostTiers + tier];
+      return errors[2 * kMostSimplexTiers * slot + kMostSimplexTiers + tier];
     }
   };
   /// Models of the functions of one order i + j + k, in one tier, over one part.
@@ -74,7 +75,7 @@ class SimplexModels {
   /// kind: prism (its triangle) or tet. Shared by all threads and made when first requested.
   static const SimplexModels& get(CellKind kind, Basis basis, int order);
 
-  /// Tiers ascend from the lowest degree on; there are at most kMostTiers.
+  /// Tiers ascend from the lowest degree on; there are at most kMostSimplexTiers.
   int num_tiers() const { return static_cast<int>(tiers_.size()); }
   const SimplexTables& tables(int tier) const { return *tiers_[tier]; }
   bool is_exact() const { return basis_ == Basis::legendre; }
@@ -101,7 +102,7 @@ class SimplexModels {
   class Kernels;
   struct Stored {
     std::shared_ptr<const Part> part;
-    std::array<Models, kMostTiers> models;
+    std::array<Models, kMostSimplexTiers> models;
   };
 
   SimplexModels(CellKind kind, Basis basis, int order);

@@ -103,7 +103,7 @@ SimplexPolynomial SimplexPolynomial::times_affine(const std::array<double, 4>& v
       if (dimension_ == 3) add(e2, e3, length, result.row(e2, e3 + 1), values[3]);
     }
   // Each b_alpha is a mean of four values times b's: with an error of 4 units in the value, a product, three sums.
-  result.rounding_ = 1.0001 * (rounding_ + 9 * kRoundoff * bound_);
+  result.rounding_ = 1.0001 * (rounding_ + 9 * kDoubleRoundoff * bound_);
   result.find_bound();
   return result;
 }
@@ -115,8 +115,8 @@ SimplexPolynomial SimplexPolynomial::combined(double weight_a, const SimplexPoly
   for (std::size_t m = 0; m < a.terms_.size(); ++m)
     result.terms_[m] = weight_a * a.terms_[m] + weight_b * b.terms_[m];
   const double size_a = std::abs(weight_a), size_b = std::abs(weight_b);
-  result.rounding_ = 1.0001 * (size_a * (a.rounding_ + 2 * kRoundoff * a.bound_) +
-                               size_b * (b.rounding_ + 2 * kRoundoff * b.bound_));
+  result.rounding_ = 1.0001 * (size_a * (a.rounding_ + 2 * kDoubleRoundoff * a.bound_) +
+                               size_b * (b.rounding_ + 2 * kDoubleRoundoff * b.bound_));
   result.find_bound();
   return result;
 }
@@ -140,7 +140,7 @@ SimplexPolynomial SimplexPolynomial::convolved(std::span<const double> weights, 
   }
   // Each b_alpha is a sum of means of products; alpha is a sum of two exponents in at most num_terms ways.
   const double num_terms = std::pow(1 + n / (dimension + 1.0), dimension + 1);
-  result.rounding_ = 1.0001 * (result.rounding_ + (num_terms + 5) * kRoundoff * sizes);
+  result.rounding_ = 1.0001 * (result.rounding_ + (num_terms + 5) * kDoubleRoundoff * sizes);
   result.find_bound();
   return result;
 }

@@ -68,9 +68,9 @@ class SimplexPolynomial {
   void bernstein(double* coefficients) const;
   /// Bounds on |b_alpha|, and so on |p|; on the errors of the b_alpha, including those of `bernstein`.
   double bound() const { return bound_; }
-  double rounding() const { return rounding_ + 32 * kRoundoff * bound_; }
+  double rounding() const { return rounding_ + 32 * kDoubleRoundoff * bound_; }
 
-  static constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
+  static constexpr double kDoubleRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
  private:
   SimplexPolynomial() = default;

@@ -9,9 +9,9 @@
 namespace subvol::internal {
 
 const SimplexTables& SimplexTables::get(int dimension, int degree) {
-  assert((dimension == 2 || dimension == 3) && degree >= 1 && degree <= kMaxDegree);
-  static std::array<std::array<std::unique_ptr<const SimplexTables>, kMaxDegree + 1>, 2> tables;
-  static std::array<std::array<std::once_flag, kMaxDegree + 1>, 2> made;
+  assert((dimension == 2 || dimension == 3) && degree >= 1 && degree <= kMostTableDegree);
+  static std::array<std::array<std::unique_ptr<const SimplexTables>, kMostTableDegree + 1>, 2> tables;
+  static std::array<std::array<std::once_flag, kMostTableDegree + 1>, 2> made;
   const auto d = static_cast<std::size_t>(dimension - 2);
   std::call_once(made[d][degree], [&] { tables[d][degree].reset(new SimplexTables(dimension, degree)); });
   return *tables[d][degree];
@@ -25,7 +25,7 @@ SimplexTables::SimplexTables(int dimension, int degree)
       ++e[c];
       raised[c].push_back(index.find(e));
     }
-    raised[c].resize(rounded_up(lower.size(), kLanes));
+    raised[c].resize(rounded_up(lower.size(), kControlPointLanes));
   }
 }
 

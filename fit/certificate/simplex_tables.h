@@ -13,15 +13,16 @@ inline std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + uni
 /// Neighbors among the Bernstein coefficients of one degree over a triangle or tetrahedron.
 class SimplexTables {
  public:
-  static constexpr int kMaxDegree = 24;
-  static constexpr std::size_t kLanes = 4;  ///< control points are processed this many numbers at a time
+  static constexpr int kMostTableDegree = 24;
+  static constexpr std::size_t kControlPointLanes = 4;  ///< control points are processed this many numbers at a time
 
-  /// dimension: 2 or 3; degree: 1 .. kMaxDegree. Shared by all threads and made when first requested.
+  /// dimension: 2 or 3; degree: 1 .. kMostTableDegree. Shared by all threads and made when first requested.
   static const SimplexTables& get(int dimension, int degree);
 
-  SimplexIndex index, lower;                      ///< of the degree, and of one less
-  std::size_t stride;                             ///< a multiple of kWide, at least index.size()
-  std::array<std::vector<int>, 4> raised;         ///< per index of `lower`: with one exponent more; padded to kLanes
+  SimplexIndex index, lower;  ///< of the degree, and of one less
+  std::size_t stride;        ///< a multiple of kWide, at least index.size()
+  /// Per index of `lower`: with one exponent more; padded to kControlPointLanes.
+  std::array<std::vector<int>, 4> raised;
 
   /// Bisection of the side from vertex a to b > a. Made when first requested.
   const SimplexHalving& halving(int a, int b) const;

@@ -16,10 +16,10 @@ using namespace internal;
 namespace {
 
 /// Value of a mode that counts as 0, and how far outside the cell canonical coordinates may be.
-constexpr double kZeroWeight = 1e-15, kOutside = 1e-9;
+constexpr double kZeroWeight = 1e-15, kOutsideTolerance = 1e-9;
 
 bool is_inside(CellKind kind, const Vec3& p) {
-  const auto within = [](double x) { return x >= -kOutside && x <= 1 + kOutside; };  // false for NaN
+  const auto within = [](double x) { return x >= -kOutsideTolerance && x <= 1 + kOutsideTolerance; };  // false for NaN
   if (!within(p[0]) || !within(p[1]) || !within(p[2])) return false;
   if (kind == CellKind::tet) return within(p[0] + p[1] + p[2]);
   if (kind == CellKind::pyramid) return within(p[0] + p[2]) && within(p[1] + p[2]);

@@ -45,7 +45,7 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
 
 std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
                               double own_share) {
-  constexpr double kLeastShare = 1e-3;  // of the common length: a collapsed edge must not make a box flat
+  constexpr double kLeastBoxLengthShare = 1e-3;  // of the common length: a collapsed edge must not make a box flat
   double ideal_volumes = 0;
   for (CellKind kind : mesh.kinds) ideal_volumes += ideal_volume(kind);
   const double common = std::cbrt(volume / std::max(ideal_volumes, std::numeric_limits<double>::min()));
@@ -54,7 +54,7 @@ std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> node
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const Vec3 lengths = box_lengths(mesh.kinds[c], mesh.cell(c), nodes);
     for (int i = 0; i < 3; ++i)
-      boxes[c][i] = common * std::pow(std::max(lengths[i] / common, kLeastShare), own_share);
+      boxes[c][i] = common * std::pow(std::max(lengths[i] / common, kLeastBoxLengthShare), own_share);
     total += ideal_volume(mesh.kinds[c]) * boxes[c].prod();
   }
   const double scale = std::cbrt(volume / total);

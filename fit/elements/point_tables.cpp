@@ -13,8 +13,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // per block
-constexpr std::size_t kMostWide = kMostRows / kWide;
+constexpr std::size_t kMostRowsPerBlock = 256;
+constexpr std::size_t kMostWide = kMostRowsPerBlock / kWide;
 /// Numbers of groups of eight points, and of modes, that are summed at once: enough that sums do not wait for one
 /// another.
 constexpr int kWideAtOnce = 4, kModesAtOnce = 4;
@@ -109,7 +109,7 @@ PointTables::PointTables(const ElementSpace& space, std::span<const CellPoint> p
     const Index c = points[first].cell;
     const CellKind kind = space.kind(c);
     const unsigned sides = sides_at(kind, points[first].point);
-    for (end = first + 1; end < points.size() && end - first < kMostRows; ++end)
+    for (end = first + 1; end < points.size() && end - first < kMostRowsPerBlock; ++end)
       if (points[end].cell != c || sides_at(kind, points[end].point) != sides) break;
     TableKey key{kind, {}, {}};
     auto& [key_kind, key_modes, key_points] = key;

@@ -80,8 +80,9 @@ std::span<const Vec3> canonical_vertices(CellKind kind) {
 }
 
 EntityShape entity_shape(CellKind kind) {
-  constexpr EntityShape kShapes[] = {EntityShape::tet, EntityShape::prism, EntityShape::hex, EntityShape::pyramid};
-  return kShapes[static_cast<std::size_t>(kind)];
+  constexpr EntityShape kShapesOfCellKinds[] = {EntityShape::tet, EntityShape::prism, EntityShape::hex,
+                                                EntityShape::pyramid};
+  return kShapesOfCellKinds[static_cast<std::size_t>(kind)];
 }
 
 int num_modes(EntityShape shape, int order) {

@@ -17,7 +17,7 @@ namespace subvol::internal {
 namespace {
 
 constexpr double kFullTurn = 360, kLeastLimit = 300;  // degrees
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kLeastArm = 1e-12;  // of vectors that are divided by, in the unit of the nodes
 
 /// Returns the wedge of a cell at one of its edges, from corner a to corner b, and the local faces before and after it.
@@ -138,7 +138,7 @@ double BoundaryFolds::angle(std::size_t edge, const VolumeMesh& mesh, std::span<
     const Arm after(x(wedge.a), x(wedge.b), 0.5 * (x(wedge.after[0]) + x(wedge.after[1])));
     sum += std::atan2(before.t.dot(before.across.cross(after.across)), before.across.dot(after.across));
   }
-  return sum / kDegree;
+  return sum / kRadiansPerDegree;
 }
 
 double BoundaryFolds::residual(std::size_t edge, const VolumeMesh& mesh, std::span<const Vec3> nodes) const {
@@ -156,7 +156,7 @@ BoundaryFolds::Residual BoundaryFolds::linearized(std::size_t edge, const Volume
                                                   std::span<const Vec3> nodes) const {
   Residual result{residual(edge, mesh, nodes), {}};
   if (!(result.value > 0)) return result;
-  const double scale = 1 / (kDegree * (kFullTurn - limits_[edge]));
+  const double scale = 1 / (kRadiansPerDegree * (kFullTurn - limits_[edge]));
   const auto side = [&](const Wedge& wedge, const std::array<std::int8_t, 2>& others, double sign) {
     const auto cell = mesh.cell(wedge.cell);
     const auto x = [&](std::int8_t corner) -> const Vec3& { return nodes[cell[corner]]; };

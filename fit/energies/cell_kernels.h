@@ -116,11 +116,11 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
             factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
 }
 
-/// Evaluates one of the distortions at kAtOnce points.
+/// Evaluates one of the distortions at kDistortionPointsAtOnce points.
 struct DistortionKernel {
-  static constexpr int kAtOnce = 2;  // points; the rotation of one need not wait for that of the other
+  static constexpr int kDistortionPointsAtOnce = 2;  // the rotation of one need not wait for that of the other
   using Batch = DistortionBatch;
-  Batch batches[kAtOnce];
+  Batch batches[kDistortionPointsAtOnce];
   const DistortionKernels& kernels;
 
   DistortionKernel(double /*regularization*/, const DistortionKernels& chosen, double floor) : kernels(chosen) {
@@ -139,9 +139,9 @@ struct DistortionKernel {
 
 /// Evaluates the regularized barrier at one point.
 struct RegularizedKernel {
-  static constexpr int kAtOnce = 1;  // point; only untangling uses it, which takes little time
+  static constexpr int kBarrierPointsAtOnce = 1;  // only untangling uses it, which takes little time
   using Batch = RegularizedBatch;
-  Batch batches[kAtOnce];
+  Batch batches[kBarrierPointsAtOnce];
   double epsilon;
 
   RegularizedKernel(double regularization, const DistortionKernels&, double /*floor*/) : epsilon(regularization) {}

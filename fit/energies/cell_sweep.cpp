@@ -55,27 +55,27 @@ void CellSweep::from_dense(std::size_t first, const Wide (*j)[9]) {
 }
 
 template void CellSweep::to_dense<1>(std::size_t, Wide (*)[9]) const;
-template void CellSweep::to_dense<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::to_dense<CellSweep::kPointsPerChunk>(std::size_t, Wide (*)[9]) const;
 template void CellSweep::from_dense<1>(std::size_t, const Wide (*)[9]);
-template void CellSweep::from_dense<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
+template void CellSweep::from_dense<CellSweep::kPointsPerChunk>(std::size_t, const Wide (*)[9]);
 
 void CellSweep::expand() {
   const std::size_t num = group_.collapsed.num_functions();
-  for (std::size_t m = 0; m < num; m += kPoints) {
-    Wide j[kPoints][9];
-    const std::size_t count = std::min<std::size_t>(kPoints, num - m);
-    count == kPoints ? to_dense<kPoints>(m, j) : to_dense<1>(m, j);
+  for (std::size_t m = 0; m < num; m += kPointsPerChunk) {
+    Wide j[kPointsPerChunk][9];
+    const std::size_t count = std::min<std::size_t>(kPointsPerChunk, num - m);
+    count == kPointsPerChunk ? to_dense<kPointsPerChunk>(m, j) : to_dense<1>(m, j);
     for (std::size_t n = 0; n < count; ++n) put(j[n], &expansion_[9 * (m + n)]);
   }
 }
 
 void CellSweep::collect() {
   const std::size_t num = group_.collapsed.num_functions();
-  for (std::size_t m = 0; m < num; m += kPoints) {
-    Wide j[kPoints][9];
-    const std::size_t count = std::min<std::size_t>(kPoints, num - m);
+  for (std::size_t m = 0; m < num; m += kPointsPerChunk) {
+    Wide j[kPointsPerChunk][9];
+    const std::size_t count = std::min<std::size_t>(kPointsPerChunk, num - m);
     std::copy_n(&expansion_sums_[9 * m], 9 * count, j[0]);
-    count == kPoints ? from_dense<kPoints>(m, j) : from_dense<1>(m, j);
+    count == kPointsPerChunk ? from_dense<kPointsPerChunk>(m, j) : from_dense<1>(m, j);
   }
 }
 
@@ -202,9 +202,9 @@ void CellSweep::from_triangle(std::size_t first, const Wide (*j)[9]) {
 }
 
 template void CellSweep::to_triangle<1>(std::size_t, Wide (*)[9]) const;
-template void CellSweep::to_triangle<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::to_triangle<CellSweep::kPointsPerChunk>(std::size_t, Wide (*)[9]) const;
 template void CellSweep::from_triangle<1>(std::size_t, const Wide (*)[9]);
-template void CellSweep::from_triangle<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
+template void CellSweep::from_triangle<CellSweep::kPointsPerChunk>(std::size_t, const Wide (*)[9]);
 
 void CellSweep::to_lines() {
   for (int kj = 0; kj < m_ * m_; ++kj)

@@ -29,7 +29,7 @@ class CellSweep {
     lines_ = std::make_unique_for_overwrite<Wide[]>(lines);
     planes_ = std::make_unique_for_overwrite<Wide[]>(planes);
     plane_sums_ = std::make_unique_for_overwrite<Wide[]>(planes);
-    points_ = std::make_unique_for_overwrite<Wide[][9]>(kColumns * n_);
+    points_ = std::make_unique_for_overwrite<Wide[][9]>(kColumnsPerChunk * n_);
   }
 
   void load(std::size_t batch, std::span<const Vec3> nodes);
@@ -52,7 +52,7 @@ class CellSweep {
 
  private:
   /// Number of columns of a hex, or of points of another cell, per chunk: two, so that kernels can work on pairs.
-  static constexpr int kColumns = 2, kPoints = 2;
+  static constexpr int kColumnsPerChunk = 2, kPointsPerChunk = 2;
 
   bool is_collapsed() const { return group_.collapsed.degree >= 0; }
   std::size_t num_columns() const { return static_cast<std::size_t>(n_) * n_; }
@@ -62,12 +62,12 @@ class CellSweep {
   void run_dense(Op&& op) {
     if constexpr (kBack) std::fill(sums_.begin(), sums_.end(), Wide{});
     const std::size_t num_points = group_.num_points();
-    for (std::size_t first = 0; first < num_points; first += kPoints) {
-      const bool all = first + kPoints <= num_points;
-      Wide j[kPoints][9];
-      all ? to_dense<kPoints>(first, j) : to_dense<1>(first, j);
-      op(first, all ? kPoints : 1, j);
-      if constexpr (kBack) all ? from_dense<kPoints>(first, j) : from_dense<1>(first, j);
+    for (std::size_t first = 0; first < num_points; first += kPointsPerChunk) {
+      const bool all = first + kPointsPerChunk <= num_points;
+      Wide j[kPointsPerChunk][9];
+      all ? to_dense<kPointsPerChunk>(first, j) : to_dense<1>(first, j);
+      op(first, all ? kPointsPerChunk : 1, j);
+      if constexpr (kBack) all ? from_dense<kPointsPerChunk>(first, j) : from_dense<1>(first, j);
     }
     if constexpr (kBack) coefficients_.swap(sums_);
   }
@@ -105,12 +105,12 @@ class CellSweep {
     for (int layer = 0; layer < n_; ++layer) {
       to_layer(layer);
       if constexpr (kBack) std::fill(layer_sums_.begin(), layer_sums_.end(), Wide{});
-      for (std::size_t first = 0; first < size; first += kPoints) {
-        const bool all = first + kPoints <= size;
-        Wide j[kPoints][9];
-        all ? to_triangle<kPoints>(first, j) : to_triangle<1>(first, j);
-        op(layer * size + first, all ? kPoints : 1, j);
-        if constexpr (kBack) all ? from_triangle<kPoints>(first, j) : from_triangle<1>(first, j);
+      for (std::size_t first = 0; first < size; first += kPointsPerChunk) {
+        const bool all = first + kPointsPerChunk <= size;
+        Wide j[kPointsPerChunk][9];
+        all ? to_triangle<kPointsPerChunk>(first, j) : to_triangle<1>(first, j);
+        op(layer * size + first, all ? kPointsPerChunk : 1, j);
+        if constexpr (kBack) all ? from_triangle<kPointsPerChunk>(first, j) : from_triangle<1>(first, j);
       }
       if constexpr (kBack) from_layer(layer);
     }
@@ -123,8 +123,8 @@ class CellSweep {
   void run_tensor(Op&& op) {
     to_lines();
     to_planes();
-    for (std::size_t column = 0; column < num_columns(); column += kColumns) {
-      const int count = static_cast<int>(std::min<std::size_t>(kColumns, num_columns() - column));
+    for (std::size_t column = 0; column < num_columns(); column += kColumnsPerChunk) {
+      const int count = static_cast<int>(std::min<std::size_t>(kColumnsPerChunk, num_columns() - column));
       for (int c = 0; c < count; ++c) to_points(column + c, points_.get() + c * n_);
       op(column * n_, count * n_, points_.get());
       if constexpr (kBack)

@@ -24,7 +24,7 @@ std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, c
   return {1 - second - third, second, third};
 }
 
-constexpr std::size_t kMostPoints = 6;  // of a triangle
+constexpr std::size_t kMostPointsPerTriangle = 6;
 
 /// Distance, as a share of the target's length, below which rounding makes the direction between two points arbitrary.
 constexpr double kLeastOffset = 1e-6;
@@ -36,14 +36,16 @@ constexpr double kAgreement = 0.2, kDiscount = 0.02;
 /// corners, which serve as points of the edges, where the surfaces are farthest apart.
 std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
   constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
-  static constexpr std::array<std::array<double, 3>, 1> kOne = {{{kThird, kThird, kThird}}};
-  static constexpr std::array<std::array<double, 3>, kMostPoints> kMost = {{{kTwoThirds, kSixth, kSixth},
-                                                                            {kSixth, kTwoThirds, kSixth},
-                                                                            {kSixth, kSixth, kTwoThirds},
-                                                                            {1, 0, 0},
-                                                                            {0, 1, 0},
-                                                                            {0, 0, 1}}};
-  return number == 1 ? std::span<const std::array<double, 3>>(kOne) : std::span(kMost).first(number);
+  static constexpr std::array<std::array<double, 3>, 1> kTriangleCentroid = {{{kThird, kThird, kThird}}};
+  static constexpr std::array<std::array<double, 3>, kMostPointsPerTriangle> kDenseTrianglePoints = {
+      {{kTwoThirds, kSixth, kSixth},
+       {kSixth, kTwoThirds, kSixth},
+       {kSixth, kSixth, kTwoThirds},
+       {1, 0, 0},
+       {0, 1, 0},
+       {0, 0, 1}}};
+  return number == 1 ? std::span<const std::array<double, 3>>(kTriangleCentroid)
+                     : std::span(kDenseTrianglePoints).first(number);
 }
 
 }  // namespace
@@ -138,7 +140,7 @@ void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
     throw InputError("ClosestPointEnergy: one entry is expected for each sample triangle");
   std::size_t offset = 0;
   for (std::size_t t = 0; t < refined.size(); ++t) {
-    const std::size_t points = refined[t] ? kMostPoints : surface_offsets_[t + 1] - surface_offsets_[t];
+    const std::size_t points = refined[t] ? kMostPointsPerTriangle : surface_offsets_[t + 1] - surface_offsets_[t];
     surface_offsets_[t] = offset;
     offset += points;
   }

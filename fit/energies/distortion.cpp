@@ -26,8 +26,8 @@ using WideBits = std::int64_t __attribute__((vector_size(kWide * sizeof(std::int
   const WideBits exponent_bits = (bits - kSqrtHalf) & kExponent;
   const Wide m = (Wide)(bits - exponent_bits);
   // The exponent as a double without an integer conversion (which AVX2 lacks for 64 bits).
-  constexpr double kMagic = 6755399441055744.0;  // 1.5 * 2^52
-  const Wide k = (Wide)((WideBits)wide(kMagic) + (exponent_bits >> 52)) - kMagic;
+  constexpr double kIntegerToDoubleOffset = 6755399441055744.0;  // 1.5 * 2^52
+  const Wide k = (Wide)((WideBits)wide(kIntegerToDoubleOffset) + (exponent_bits >> 52)) - kIntegerToDoubleOffset;
   const Wide s = (m - 1) * reciprocal(m + 1), s2 = s * s;
   const Wide series =
       1 + s2 * (1.0 / 3 + s2 * (1.0 / 5 + s2 * (1.0 / 7 + s2 * (1.0 / 9 + s2 * (1.0 / 11 + s2 * (1.0 / 13 + s2 * (1.0 /

@@ -35,11 +35,12 @@ template <bool kCoupled>
 
 /// Stores a point's numbers in single precision, clamped to the range that it can hold.
 inline void keep_frozen(const Wide* frozen, int size, Narrow* kept) {
-  constexpr double kMost = 1e30;  // single precision ends at 3e38; sums of many such numbers stay below that
+  // Single precision ends at 3e38; sums of many such numbers stay below that.
+  constexpr double kMostFrozenNumber = 1e30;
   for (int k = 0; k < size; ++k) {
     Wide x = frozen[k];
-    take_lower(x, Wide{} + kMost);
-    take_higher(x, Wide{} - kMost);
+    take_lower(x, Wide{} + kMostFrozenNumber);
+    take_higher(x, Wide{} - kMostFrozenNumber);
     kept[k] = narrow(x);
   }
 }

@@ -116,8 +116,8 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
   group.by_point = static_cast<bool>(reference_);
   const std::size_t per_batch = group.by_point ? group.num_points() : 1;
   group.to_reference.resize(9 * per_batch * group.batches.size());
-  constexpr Index kNone = std::numeric_limits<Index>::max();
-  Index bad_cell = kNone;
+  constexpr Index kNoBadCell = std::numeric_limits<Index>::max();
+  Index bad_cell = kNoBadCell;
 #pragma omp parallel for schedule(static) reduction(min : bad_cell)
   for (std::size_t b = 0; b < group.batches.size(); ++b)
     for (std::size_t q = 0; q < per_batch; ++q)
@@ -133,7 +133,7 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
         }
         for (int e = 0; e < 9; ++e) lanes(group.to_reference[9 * (b * per_batch + q) + e])[l] = inverse(e / 3, e % 3);
       }
-  if (bad_cell != kNone)
+  if (bad_cell != kNoBadCell)
     throw InputError("HighOrderEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 
@@ -224,11 +224,11 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel& kernel,
                                        const PerPoint& per_point) const {
-  constexpr int kAtOnce = 2;  // points; the rotation of one need not wait for that of the other
+  constexpr int kDistortionPointsAtOnce = 2;  // the rotation of one need not wait for that of the other
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     const double hinge = hinge_weight_at(group);
-    DistortionBatch batches[kAtOnce];
+    DistortionBatch batches[kDistortionPointsAtOnce];
     for (DistortionBatch& batch : batches) batch.floor = floor_;
     Wide sum{};
     const auto evaluate = [&](std::size_t first, int count, Wide (*j)[9]) {
@@ -258,7 +258,8 @@ double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel
     };
     sweep.load(b, nodes);
     sweep.template run<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
-      for (int n = 0; n < count; n += kAtOnce) evaluate(first + n, std::min(kAtOnce, count - n), j + n);
+      for (int n = 0; n < count; n += kDistortionPointsAtOnce)
+        evaluate(first + n, std::min(kDistortionPointsAtOnce, count - n), j + n);
     });
     if constexpr (kBack) keep(group, b, sweep.coefficients());
     double total = 0;
@@ -543,12 +544,12 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
 }
 
 void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3> nodes) {
-  constexpr int kMostPoints = 25;  // more points cost more than they gain (measured)
-  constexpr double kFirstEmphasis = 4;  // then doubled with each refinement
+  constexpr int kMostPointsPerDirection = 25;  // more points cost more than they gain (measured)
+  constexpr double kFirstEmphasis = 4;         // then doubled with each refinement
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
       throw InputError("HighOrderEnergy: there is no cell " + std::to_string(c));
-    points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
+    points_[c] = std::min(std::max(points_[c], kMostPointsPerDirection), 2 * points_[c] - 1);
     own_emphasis_[c] = std::min(most_own_emphasis_, std::max(kFirstEmphasis, 2 * own_emphasis_[c]));
   }
   rebuild_groups();

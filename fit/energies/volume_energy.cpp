@@ -141,14 +141,14 @@ struct VolumeEnergy::BatchState {
   }
 };
 
-/// Evaluates a kernel at all points of a batch, kAtOnce at a time, and calls per_point(q, kernel batch) with the
-/// results.
+/// Evaluates a kernel at all points of a batch, as many at a time as the kernel has batches, and calls
+/// per_point(q, kernel batch) with the results.
 template <class Kernel, class PerPoint>
 void VolumeEnergy::for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
                               void (Kernel::*evaluate)(int), const PerPoint& per_point) const {
-  const std::size_t num_points = group.rule.num_points();
-  for (std::size_t first = 0; first < num_points; first += Kernel::kAtOnce) {
-    const int count = static_cast<int>(std::min<std::size_t>(Kernel::kAtOnce, num_points - first));
+  const std::size_t num_points = group.rule.num_points(), at_once = std::size(kernel.batches);
+  for (std::size_t first = 0; first < num_points; first += at_once) {
+    const int count = static_cast<int>(std::min(at_once, num_points - first));
     for (int n = 0; n < count; ++n) {
       auto& jacobian = kernel.batches[n].jacobian;
       jacobians(group.rule.point(first + n), state.x, state.inverse_h, jacobian);

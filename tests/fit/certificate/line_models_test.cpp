@@ -14,7 +14,7 @@ constexpr double kRounding = 1e-12;
 
 /// sum_o b_o B_o(t) by de Casteljau, and its derivative by t.
 double bernstein_sum(const double* b, int degree, double t, double& slope) {
-  std::array<double, LineModels::kMaxDegree + 1> x{};
+  std::array<double, LineModels::kMostModelDegree + 1> x{};
   std::copy_n(b, degree + 1, x.begin());
   slope = 0;
   for (int n = degree; n > 0; --n) {
