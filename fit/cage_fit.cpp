@@ -71,7 +71,7 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
     mean = measured_mean();
     volume = distortion();
     pairs = *pairs_now;
-    if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
+    if (gain < (options_.tolerance_percent ? kLeastLambdaHalvingGain : std::max(kLeastLambdaHalvingGain, cost))) break;
   }
   return true;
 }

@@ -164,14 +164,14 @@ void MeshFreeing::conclude() {
 
 /// Makes the attempts. If memory runs out in one, what was kept before stays.
 void MeshFreeing::try_to_free(const VolumeMesh& lifted) {
-  constexpr double kFirst = 0.5;  // share of the work in the first attempt
+  constexpr double kFirstFreeingWorkShare = 0.5;  // in the first attempt
   const bool is_lifted = lifted.num_cells() == result_.mesh.num_cells() &&
                          measure_quality(lifted).min_scaled_jacobian > start_.least_jacobian;
   const VolumeMesh& start = is_lifted ? lifted : result_.mesh;
   try {
-    if (!attempt(start, 0, kFirst)) return;
+    if (!attempt(start, 0, kFirstFreeingWorkShare)) return;
     if (best_.is_valid() && best_.least_jacobian >= kLayerBelow * options_.quality) return;
-    attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), kFirst, 1);
+    attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), kFirstFreeingWorkShare, 1);
   } catch (const std::bad_alloc&) {
     result_.report.stop_reason = StopReason::memory_limit;
     result_.report.explanation = "no memory was left to free the mesh from its cage";

@@ -194,11 +194,11 @@ void HighOrderDriver::begin_stage(const Stage& stage) {
   lambda_ = stage.lambda;
   mean_.reset();
   if (order_ == order_in_progress_) return;
-  constexpr double kExpectedSteps = 20;  // of an order, for the progress
+  constexpr double kExpectedOrderSteps = 20;  // for the progress
   order_in_progress_ = order_;
   // An order takes about a quarter of the work of twice the order.
   const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
-  runner_.work().begin_part(share, kExpectedSteps);
+  runner_.work().begin_part(share, kExpectedOrderSteps);
 }
 
 bool HighOrderDriver::run_stage(const Stage& stage) {

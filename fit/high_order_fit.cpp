@@ -206,10 +206,10 @@ bool HighOrderFit::run_adaptive_orders() {
 /// their volumes; if nothing is missed, only undoes the rise of lambda by unfolding. A stage that is interrupted or
 /// leaves more than `pairs` self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
-  constexpr double kLeastShare = 1e-3;  // of `lambda_close`: ten halvings
+  constexpr double kLeastHighOrderLambdaShare = 1e-3;  // of `lambda_close`: ten halvings
   const bool has_volumes = volume_percent() <= kAutomaticVolumePercent;
   const bool is_asked = options_.tolerance_percent || !has_volumes;
-  const double least = (is_asked ? kLeastShare : 1) * schedule_.lambda_close;
+  const double least = (is_asked ? kLeastHighOrderLambdaShare : 1) * schedule_.lambda_close;
   const auto is_reached = [&] {
     return is_asked && (!options_.tolerance_percent || meets_tolerance()) &&
            (has_volumes || volume_percent() <= kAutomaticVolumePercent);
@@ -224,7 +224,7 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
       return pairs_now.has_value();
     }
     pairs = *pairs_now;
-    if (1 - measured_mean() / before < kLeastGain) break;
+    if (1 - measured_mean() / before < kLeastLambdaHalvingGain) break;
   }
   return true;
 }
@@ -358,10 +358,10 @@ HighOrderFitResult HighOrderFit::run() {
 
 /// Makes the present interfaces part of the target, unless it has some of its own.
 void HighOrderFit::keep_curved_interfaces() {
-  constexpr int kIntervalsPerOrder = 4;  // chords of a part of an edge are then closer than the fit is
+  constexpr int kInterfaceIntervalsPerOrder = 4;  // chords of a part of an edge are then closer than the fit is
   if (order_ == 1) return;
   const std::vector<Index> groups = groups_of_sheets(template_, mesh_.space.topology());
-  const BoundarySamples samples = make_sheet_samples(mesh_.space, template_, kIntervalsPerOrder * order_);
+  const BoundarySamples samples = make_sheet_samples(mesh_.space, template_, kInterfaceIntervalsPerOrder * order_);
   TriangleMesh interfaces{samples.positions.apply(mesh_.coefficients), {}};
   std::vector<Index> group_of_triangle;
   for (std::size_t t = 0; t < samples.triangles.size(); ++t) {

@@ -349,10 +349,10 @@ std::string label_of(int reference, const RegionReport& report) {
 
 /// Lists the regions and interfaces: the first ones, if there are many. The report in JSON has all of them.
 void append_regions(std::string& text, const RegionReport& report) {
-  static constexpr std::size_t kMostListed = 20;
-  const auto listed = [](const auto& all) { return std::span(all).first(std::min(all.size(), kMostListed)); };
+  static constexpr std::size_t kMostListedRegions = 20;
+  const auto listed = [](const auto& all) { return std::span(all).first(std::min(all.size(), kMostListedRegions)); };
   const auto append_rest = [&](std::size_t all, const char* what) {
-    if (all > kMostListed) append(text, "%-19s and %zu more %s\n", "", all - kMostListed, what);
+    if (all > kMostListedRegions) append(text, "%-19s and %zu more %s\n", "", all - kMostListedRegions, what);
   };
   for (const RegionQuality& region : listed(report.regions))
     append(text, "region %-12s %zu cells, volume %.6g, scaled Jacobian min %.4f\n",

@@ -216,8 +216,8 @@ bool CurvedOptimizer::run_stage(const std::string& name, Part part, int steps) {
 /// alone: in the mean over all cells, a few hardly count.
 bool CurvedOptimizer::untangle_cells() {
   // Steps, for the progress, and the number of parts that are untangled with their surroundings alone.
-  constexpr int kExpectedSteps = 60, kMostParts = 4;
-  runner_.work().begin_part(kShareOfCurvedUntangling, kExpectedSteps);
+  constexpr int kExpectedCurvedUntanglingSteps = 60, kMostUntangledParts = 4;
+  runner_.work().begin_part(kShareOfCurvedUntangling, kExpectedCurvedUntanglingSteps);
   const std::vector<Index>& left = quality_.certificate.not_certified;
   const auto untangle_part = [&](Part part, const char* name) {
     dynamic_cast<HighOrderEnergy&>(*part.problem.volume).set_most_own_emphasis(0);
@@ -229,7 +229,7 @@ bool CurvedOptimizer::untangle_cells() {
     return going;
   };
   bool going = untangle_part(whole(), "untangle");
-  for (int n = 0; n < kMostParts && going && !left.empty(); ++n)
+  for (int n = 0; n < kMostUntangledParts && going && !left.empty(); ++n)
     going = untangle_part(around(left), "untangle what is left");
   return going;
 }
@@ -259,14 +259,14 @@ Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValu
 
 /// Minimizes the mean distortion and then lifts the poorest cells. Returns false if the work must end.
 bool CurvedOptimizer::improve() {
-  constexpr int kExpectedLiftSteps = 40, kMostRounds = 3;  // of lifts, each from a new state
+  constexpr int kExpectedLiftSteps = 40, kMostLiftRounds = 3;  // of lifts, each from a new state
   find_sizes();
   runner_.work().begin_part(kShareOfMeanDistortion, kMeanDistortionSteps);
   const bool going = run_stage("mean distortion", whole(), kMeanDistortionSteps);
   quality_ = measure();
   if (!going || options_.quality == 0) return going;
   runner_.work().begin_part(1, kExpectedLiftSteps);
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostLiftRounds; ++round) {
     const std::pair before(emphasis_, hinge_);
     if (lift_by("emphasis on poor shape", emphasis_, kEmphases) == Again::ended) return false;
     if (lift_by("hinge of weight", hinge_, kHinges) == Again::ended) return false;
@@ -284,7 +284,7 @@ void CurvedOptimizer::finish() {
 }
 
 CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
-  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
+  constexpr double kLeastJacobianGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const QualityReport start = measure();
   quality_ = start;
   const bool was_valid = start.certificate.not_certified.empty();
@@ -297,8 +297,9 @@ CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
   const double gain = quality_.min_scaled_jacobian - start.min_scaled_jacobian;
   const bool is_better =
       !was_valid || (quality_.certificate.not_certified.empty() &&
-                     (gain > kLeastGain ||
-                      (gain > -kLeastGain && quality_.mean_scaled_jacobian > start.mean_scaled_jacobian + kLeastGain)));
+                     (gain > kLeastJacobianGain ||
+                      (gain > -kLeastJacobianGain &&
+                       quality_.mean_scaled_jacobian > start.mean_scaled_jacobian + kLeastJacobianGain)));
   if (!is_better) {
     report_.undo_stages(0, report_.stages.size());
     quality_ = start;

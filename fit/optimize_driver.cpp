@@ -94,8 +94,9 @@ void OptimizeDriver::find_features() {
 }
 
 void OptimizeDriver::sample_boundary() {
-  constexpr int kIntervals = 2;  // along an edge: corners, middles of edges and of faces
-  samples_ = make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
+  constexpr int kSampleIntervalsPerEdge = 2;  // corners, middles of edges and of faces
+  samples_ =
+      make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kSampleIntervalsPerEdge, mesh_.tags.creases);
   refined_.assign(samples_.triangles.size(), 0);
 }
 
@@ -230,10 +231,10 @@ void OptimizeDriver::relieve_far_cells(std::span<const double> triangle_distance
 }
 
 void OptimizeDriver::weigh_cells(std::span<const double> least_jacobians) {
-  constexpr double kLeast = 1e-3;  // scaled Jacobian; no cell weighs more than a thousand ideal ones
+  constexpr double kLeastWeighedJacobian = 1e-3;  // scaled Jacobian; no cell weighs more than a thousand ideal ones
   weights_.clear();
   for (std::size_t c = 0; c < least_jacobians.size(); ++c)
-    weights_.push_back(relief_[c] / std::max(least_jacobians[c], kLeast));
+    weights_.push_back(relief_[c] / std::max(least_jacobians[c], kLeastWeighedJacobian));
 }
 
 /// Returns the largest relative change of a region's volume; 0 if the boundary has a target of its own, which changes

@@ -49,8 +49,8 @@ struct Progress {
   bool gains_on(const Progress& before, double wanted_percent) const {
     // Least rise of the mean scaled Jacobian, of the least one, and least relative fall of the distance: one of them
     // must be reached for another round to be worth its time.
-    constexpr double kLeastGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
-    return mean_jacobian - before.mean_jacobian >= kLeastGain ||
+    constexpr double kLeastMeanJacobianGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
+    return mean_jacobian - before.mean_jacobian >= kLeastMeanJacobianGain ||
            least_jacobian - before.least_jacobian >= kLeastOfWorst ||
            (max_percent > wanted_percent && max_percent < (1 - kLeastApproach) * before.max_percent);
   }
@@ -166,14 +166,14 @@ bool MeshOptimizer::untangle_all() {
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
-  // Ideal boxes and weights change after kSteps steps: more steps toward those of before are lost.
-  constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
+  // Ideal boxes and weights change after kImproveRoundSteps steps: more steps toward those of before are lost.
+  constexpr int kFirstSteps = 4, kImproveRoundSteps = 2, kMostImproveRounds = 14;
   constexpr double kLeastShareOfLambda = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
-  runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kSteps * kMaxRounds / 2);
+  runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kImproveRoundSteps * kMostImproveRounds / 2);
   if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstSteps)) return false;
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMostImproveRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kCornerPoints).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
     const bool too_far = mean_percent_ > kMeanShareOfTolerance * options_.mean_tolerance_percent ||
@@ -192,7 +192,7 @@ bool MeshOptimizer::improve() {
       if (minima[c] < releases_below_) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
-    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kSteps)) return false;
+    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kImproveRoundSteps)) return false;
   }
   return true;
 }
@@ -208,7 +208,7 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 /// Returns true if a result is better than a start whose cells are all certified: closer to a surface that the start
 /// was too far from, or of better cells at distances that are within the tolerances or no larger.
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
-  constexpr double kLeastGain = 1e-6;  // of the least scaled Jacobian; less is rounding
+  constexpr double kLeastJacobianGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
   if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||
@@ -217,7 +217,8 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
   const bool was_too_far = start.mean_percent > mean_limit || start.max_percent > max_limit;
   if (was_too_far) return now.mean_percent < start.mean_percent || now.max_percent < start.max_percent;
   const double gain = now.least_jacobian - start.least_jacobian;
-  return gain > kLeastGain || (gain > -kLeastGain && now.mean_jacobian > start.mean_jacobian + kLeastGain);
+  return gain > kLeastJacobianGain ||
+         (gain > -kLeastJacobianGain && now.mean_jacobian > start.mean_jacobian + kLeastJacobianGain);
 }
 
 /// Raises the least scaled Jacobian toward a goal; if the surface suffers, it counts more in another attempt. Returns
@@ -350,7 +351,7 @@ bool MeshOptimizer::attempt_soundly(const Measured& start, const VolumeMesh& ori
 /// with interfaces has been through several attempts and is left as it is. Returns false if the work must end.
 bool MeshOptimizer::repeat_while_poor(const VolumeMesh& original) {
   constexpr int kMostRepeats = 2;
-  constexpr double kWorthwhile = 0.01;  // least rise of the least scaled Jacobian for which there is another repeat
+  constexpr double kLeastRepeatGain = 0.01;  // of the least scaled Jacobian, for which there is another repeat
   if (options_.quality == 0 || !interfaces_.empty()) return true;
   releases_below_ = std::max(kPoorJacobian, options_.quality);
   Measured before = measure();
@@ -362,7 +363,7 @@ bool MeshOptimizer::repeat_while_poor(const VolumeMesh& original) {
     const bool is_gain = is_better(now, before);
     if (!is_gain) take(std::move(reached));
     if (!going) return false;
-    if (!is_gain || now.least_jacobian < before.least_jacobian + kWorthwhile) break;
+    if (!is_gain || now.least_jacobian < before.least_jacobian + kLeastRepeatGain) break;
     before = now;
   }
   return true;

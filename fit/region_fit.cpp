@@ -111,16 +111,16 @@ void RegionFit::find_curves() {
 
 /// Says where more than three regions, the outside among them, meet along an edge of the target; empty if nowhere does.
 std::string crowded_curve(const RegionSurface& target) {
-  constexpr std::size_t kMost = 3;  // regions, the outside among them
+  constexpr std::size_t kMostRegionsAtEdge = 3;  // the outside among them
   std::string text;
   for_each_edge(sorted_half_edges(target.mesh.triangles, target.mesh.positions.size()),
                 [&](std::span<const SurfaceHalfEdge> edge) {
-                  if (!text.empty() || edge.size() <= kMost) return;
+                  if (!text.empty() || edge.size() <= kMostRegionsAtEdge) return;
                   std::set<int> regions;
                   for (const SurfaceHalfEdge& side : edge)
                     for (const int region : target.sides[static_cast<std::size_t>(side.triangle)])
                       regions.insert(region);
-                  if (regions.size() <= kMost) return;
+                  if (regions.size() <= kMostRegionsAtEdge) return;
                   const Vec3 middle = 0.5 * (target.mesh.positions[edge[0].low] + target.mesh.positions[edge[0].high]);
                   text = formatted(
                       "; %zu regions meet along a curve through (%g, %g, %g), which a grid can follow only "
@@ -164,14 +164,14 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
 
 /// Returns true if faces of a grid lie on the target, up to rounding.
 bool RegionFit::lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const {
-  constexpr double kRounding = 1e-7;  // of the diagonal
+  constexpr double kOnTargetRounding = 1e-7;  // of the diagonal
   for (const auto& face : faces) {
     Vec3 center = Vec3::Zero();
     for (const Index v : face) center += grid.positions[v] / 4;
-    if (tree_.closest(center).distance > kRounding) return false;
+    if (tree_.closest(center).distance > kOnTargetRounding) return false;
     for (const Index v : face)
       for (const Vec3& p : {grid.positions[v], Vec3(0.5 * (center + grid.positions[v]))})
-        if (tree_.closest(p).distance > kRounding) return false;
+        if (tree_.closest(p).distance > kOnTargetRounding) return false;
   }
   return true;
 }

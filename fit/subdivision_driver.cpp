@@ -107,7 +107,7 @@ void SubdivisionDriver::sample_target() {
 /// Ends a fit to some of the target's samples with a few steps toward all of them, and rolls them back if more of the
 /// boundary's triangles intersect then. Returns false if the fit must end.
 bool SubdivisionDriver::fit_all_samples() {
-  constexpr int kSteps = 2;  // the state is close to a minimum already
+  constexpr int kAllSamplesSteps = 2;  // the state is close to a minimum already
   if (samples_all_) return true;
   const std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return false;
@@ -115,7 +115,7 @@ bool SubdivisionDriver::fit_all_samples() {
   target_.sample(level_.samples.num_rows());
   samples_all_ = true;
   Stage stage = schedule_.final_stage(lambda_);
-  stage.max_iterations = kSteps;
+  stage.max_iterations = kAllSamplesSteps;
   if (!run_stage(stage, stage_name(stage) + ", all of the target")) return false;
   const std::optional<std::size_t> pairs_now = intersecting_pairs();
   if (pairs_now && *pairs_now > *pairs) go_back(std::move(start));
@@ -157,7 +157,7 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
 /// Makes the level's start valid by continuation from the linear split L of the level below:
 ///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionDriver::start_level() {
-  constexpr int kMaxRounds = 60;  // of a continuation, to bound the time
+  constexpr int kMostContinuationRounds = 60;  // of a continuation, to bound the time
   // Factor on the gain of t until it is feasible, the least gain that counts, and the share of the rest below which the
   // gain is slow: then lambda rises.
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
@@ -172,7 +172,7 @@ bool SubdivisionDriver::start_level() {
   };
   Stage stage = schedule_.continuation;
   double t = 0;
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMostContinuationRounds; ++round) {
     safe = level_.safe_nodes.apply(unknowns_);
     wanted = nodes.apply(unknowns_);
     double next = 1;

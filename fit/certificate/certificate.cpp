@@ -85,7 +85,7 @@ Bounds bounds(CellKind kind, std::span<const Vec3> corners) {
   return result;
 }
 
-/// Computes `bounds` of kLanes hexes at once, with the same operations in each lane.
+/// Computes `bounds` of kSimdLanes hexes at once, with the same operations in each lane.
 void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bounds* out) {
   std::array<Lanes, 27> d;
   EdgeLengths<Lanes> lengths;
@@ -95,7 +95,7 @@ void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bou
     coefficient = smaller(coefficient, d[i]);
     if (is_corner(CellKind::hex, i)) corner = smaller(corner, d[i]);
   }
-  for (int lane = 0; lane < kLanes; ++lane) {
+  for (int lane = 0; lane < kSimdLanes; ++lane) {
     const auto& m = lengths.squared_max;
     const EdgeLengths<double> own{{m[0][lane], m[1][lane], m[2][lane]}, lengths.squared_sum[lane]};
     out[lane] = {coefficient[lane], corner[lane], bernstein::length_scale(own)};
@@ -106,9 +106,9 @@ void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bou
 template <class Visit>
 void for_each_cell_bounds(std::span<const Vec3> positions, const VolumeMesh& mesh, const Visit& visit) {
   const auto hexes = [&](std::size_t first) {
-    Bounds result[kLanes];
+    Bounds result[kSimdLanes];
     bounds_of_hexes(positions, mesh.cell(first).data(), result);
-    for (int lane = 0; lane < kLanes; ++lane) visit(first + lane, result[lane]);
+    for (int lane = 0; lane < kSimdLanes; ++lane) visit(first + lane, result[lane]);
   };
   for_each_cell_block(mesh, hexes, [&](std::size_t c) {
     const auto corners = gather_cell(positions, mesh, c);

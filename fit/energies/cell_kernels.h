@@ -8,37 +8,37 @@
 
 #include <span>
 
-/// Kernels of `VolumeEnergy` at one quadrature point of kLanes cells; private to it.
+/// Kernels of `VolumeEnergy` at one quadrature point of kSimdLanes cells; private to it.
 namespace subvol::internal {
 
 /// Computes J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
-inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes],
-                      const double (*inverse_h)[kLanes], double (*jacobian)[kLanes]) {
+inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kSimdLanes],
+                      const double (*inverse_h)[kSimdLanes], double (*jacobian)[kSimdLanes]) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) {
-      double sum[kLanes] = {};
+      double sum[kSimdLanes] = {};
       for (const ElementRule::Entry& entry : entries)
 #pragma omp simd
-        for (int l = 0; l < kLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
-      for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[c][l];
+        for (int l = 0; l < kSimdLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
+      for (int l = 0; l < kSimdLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[c][l];
     }
 }
 
 /// m = m b, lane by lane: changes from the ideal to the reference shape.
-inline void multiply_lanes(double (*m)[kLanes], const double (*b)[kLanes]) {
+inline void multiply_lanes(double (*m)[kSimdLanes], const double (*b)[kSimdLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
+    for (int l = 0; l < kSimdLanes; ++l) {
       const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
       for (int c = 0; c < 3; ++c) m[3 * r + c][l] = m0 * b[c][l] + m1 * b[3 + c][l] + m2 * b[6 + c][l];
     }
 }
 
 /// m = m b^T, lane by lane: changes the stress back to the ideal shape.
-inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
+inline void multiply_lanes_transposed(double (*m)[kSimdLanes], const double (*b)[kSimdLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
+    for (int l = 0; l < kSimdLanes; ++l) {
       const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
       for (int c = 0; c < 3; ++c)
         m[3 * r + c][l] = m0 * b[3 * c][l] + m1 * b[3 * c + 1][l] + m2 * b[3 * c + 2][l];
@@ -46,10 +46,10 @@ inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLa
 }
 
 /// v = b v, lane by lane: changes the right singular vectors so that V^T grad N becomes V^T b^T grad N.
-inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
+inline void premultiply(const double (*b)[kSimdLanes], double (*v)[kSimdLanes]) {
   for (int c = 0; c < 3; ++c)
 #pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
+    for (int l = 0; l < kSimdLanes; ++l) {
       const double v0 = v[c][l], v1 = v[3 + c][l], v2 = v[6 + c][l];
       for (int r = 0; r < 3; ++r) v[3 * r + c][l] = b[3 * r][l] * v0 + b[3 * r + 1][l] * v1 + b[3 * r + 2][l] * v2;
     }
@@ -59,21 +59,21 @@ inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
 ///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi + coupling_ij w_ai w_bj.
 template <bool kCoupled>
 void add_point_hessian(std::span<const ElementRule::Entry> entries, const DistortionBatch& batch,
-                       const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
+                       const double (*inverse_h)[kSimdLanes], const double* weight, double (*k)[9][kSimdLanes]) {
   constexpr int kPairs = kMaxCellVertices;
-  alignas(64) double w[kPairs][3][kLanes];
+  alignas(64) double w[kPairs][3][kSimdLanes];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (int i = 0; i < 3; ++i)
 #pragma omp simd
-      for (int l = 0; l < kLanes; ++l)
+      for (int l = 0; l < kSimdLanes; ++l)
         w[a][i][l] = batch.v[i][l] * inverse_h[0][l] * entries[a].gradient[0] +
                      batch.v[3 + i][l] * inverse_h[1][l] * entries[a].gradient[1] +
                      batch.v[6 + i][l] * inverse_h[2][l] * entries[a].gradient[2];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (std::size_t b = a; b < entries.size(); ++b) {
-      double (*block)[kLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
+      double (*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
 #pragma omp simd
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         const double p00 = w[a][0][l] * w[b][0][l], p11 = w[a][1][l] * w[b][1][l], p22 = w[a][2][l] * w[b][2][l];
         const double s01 = batch.pair_same[0][l], s12 = batch.pair_same[1][l], s20 = batch.pair_same[2][l];
         const double f = weight[l];
@@ -104,12 +104,12 @@ void add_point_hessian(std::span<const ElementRule::Entry> entries, const Distor
 }
 
 /// Adds the stress at one point to the gradients of its active vertices.
-inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const double (*stress)[kLanes],
-                               const double (*factor)[kLanes], double (*g)[3][kLanes]) {
+inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const double (*stress)[kSimdLanes],
+                               const double (*factor)[kSimdLanes], double (*g)[3][kSimdLanes]) {
   for (const ElementRule::Entry& entry : entries)
     for (int r = 0; r < 3; ++r)
 #pragma omp simd
-      for (int l = 0; l < kLanes; ++l)
+      for (int l = 0; l < kSimdLanes; ++l)
         g[entry.vertex][r][l] +=
             factor[0][l] * stress[3 * r][l] * entry.gradient[0] +
             factor[1][l] * stress[3 * r + 1][l] * entry.gradient[1] +
@@ -129,8 +129,8 @@ struct DistortionKernel {
   void evaluate_energy(int count) { kernels.energy(batches, count); }
   void evaluate_gradient(int count) { kernels.gradient(batches, count); }
   void evaluate_hessian(int count) { kernels.hessian(batches, count); }
-  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
-                   const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
+  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kSimdLanes],
+                   const double (*inverse_h)[kSimdLanes], const double* weight, double (*k)[9][kSimdLanes]) {
     if (reference) premultiply(reference, batch.v);
     kernels.coupled ? add_point_hessian<true>(entries, batch, inverse_h, weight, k)
                     : add_point_hessian<false>(entries, batch, inverse_h, weight, k);
@@ -151,16 +151,17 @@ struct RegularizedKernel {
 
   /// K_ab = alpha w_a.w_b I + beta (J w_a (C w_b)^T + C w_a (J w_b)^T) + gamma C w_a (C w_b)^T for a <= b, with
   /// w_a = B^T diag(1/h) grad N_a, where B is `reference`.
-  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
-                   const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
-    alignas(64) double w[kMaxCellVertices][3][kLanes], jw[kMaxCellVertices][3][kLanes], cw[kMaxCellVertices][3][kLanes];
+  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kSimdLanes],
+                   const double (*inverse_h)[kSimdLanes], const double* weight, double (*k)[9][kSimdLanes]) {
+    alignas(64) double w[kMaxCellVertices][3][kSimdLanes], jw[kMaxCellVertices][3][kSimdLanes],
+        cw[kMaxCellVertices][3][kSimdLanes];
     for (std::size_t a = 0; a < entries.size(); ++a) {
       for (int i = 0; i < 3; ++i)
 #pragma omp simd
-        for (int l = 0; l < kLanes; ++l) w[a][i][l] = inverse_h[i][l] * entries[a].gradient[i];
+        for (int l = 0; l < kSimdLanes; ++l) w[a][i][l] = inverse_h[i][l] * entries[a].gradient[i];
       if (reference) {
 #pragma omp simd
-        for (int l = 0; l < kLanes; ++l) {
+        for (int l = 0; l < kSimdLanes; ++l) {
           const double w0 = w[a][0][l], w1 = w[a][1][l], w2 = w[a][2][l];
           for (int i = 0; i < 3; ++i)
             w[a][i][l] = reference[i][l] * w0 + reference[3 + i][l] * w1 + reference[6 + i][l] * w2;
@@ -168,7 +169,7 @@ struct RegularizedKernel {
       }
       for (int r = 0; r < 3; ++r)
 #pragma omp simd
-        for (int l = 0; l < kLanes; ++l) {
+        for (int l = 0; l < kSimdLanes; ++l) {
           jw[a][r][l] = batch.jacobian[3 * r][l] * w[a][0][l] + batch.jacobian[3 * r + 1][l] * w[a][1][l] +
                         batch.jacobian[3 * r + 2][l] * w[a][2][l];
           cw[a][r][l] = batch.cofactor[3 * r][l] * w[a][0][l] + batch.cofactor[3 * r + 1][l] * w[a][1][l] +
@@ -177,9 +178,9 @@ struct RegularizedKernel {
     }
     for (std::size_t a = 0; a < entries.size(); ++a)
       for (std::size_t b = a; b < entries.size(); ++b) {
-        double (*block)[kLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
+        double (*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
 #pragma omp simd
-        for (int l = 0; l < kLanes; ++l) {
+        for (int l = 0; l < kSimdLanes; ++l) {
           const double f = weight[l], beta = f * batch.beta[l], gamma = f * batch.gamma[l];
           const double alpha =
               f * batch.alpha[l] *

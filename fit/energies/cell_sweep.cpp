@@ -16,11 +16,11 @@ template <int kCount>
 }  // namespace
 
 void CellSweep::load(std::size_t batch, std::span<const Vec3> nodes) {
-  const std::size_t first = batch * group_.num_modes * kLanes;
+  const std::size_t first = batch * group_.num_modes * kSimdLanes;
   for (std::size_t a = 0; a < group_.num_modes; ++a)
-    for (int l = 0; l < kLanes; ++l) {
-      const Index node = group_.nodes[first + a * kLanes + l];
-      const double sign = group_.signs[first + a * kLanes + l];
+    for (int l = 0; l < kSimdLanes; ++l) {
+      const Index node = group_.nodes[first + a * kSimdLanes + l];
+      const double sign = group_.signs[first + a * kSimdLanes + l];
       for (int r = 0; r < 3; ++r) lanes(coefficients_[3 * a + r])[l] = node == kNoIndex ? 0.0 : sign * nodes[node][r];
     }
 }

@@ -11,7 +11,7 @@ namespace subvol::internal {
 
 namespace {
 
-static_assert(kLanes == kWide);
+static_assert(kSimdLanes == kWide);
 
 using WideBits = std::int64_t __attribute__((vector_size(kWide * sizeof(std::int64_t))));
 
@@ -72,7 +72,7 @@ enum class Order { energy, gradient, hessian };
 
 [[gnu::always_inline]] inline Wide exponential(const Wide& x) {
   Wide result;
-  for (int l = 0; l < kLanes; ++l) result[l] = std::exp(x[l]);
+  for (int l = 0; l < kSimdLanes; ++l) result[l] = std::exp(x[l]);
   return result;
 }
 
@@ -242,7 +242,7 @@ void hencky_hessian(DistortionBatch& batch) { evaluate<Distortion::hencky, Order
 double hencky(const Mat3& jacobian, Mat3* stress) {
   DistortionBatch batch;
   for (int k = 0; k < 9; ++k)
-    for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
+    for (int l = 0; l < kSimdLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
   hencky_gradient(batch);
   if (stress)
     for (int k = 0; k < 9; ++k) (*stress)(k / 3, k % 3) = batch.stress[k][0];

@@ -10,7 +10,7 @@ namespace subvol::internal {
 /// Default floor to which the eigenvalues of a distortion's second derivative are raised (dimensionless).
 inline constexpr double kHessianFloor = 0.01;
 
-/// Distortion energies of kLanes Jacobians, lane by lane, with their derivatives.
+/// Distortion energies of kSimdLanes Jacobians, lane by lane, with their derivatives.
 ///
 ///   e(J) = 1/2 |H|^2,  H = 1/2 ln(J^T J),  de/dJ = J^-T H                      Paper: section 3.1, appendix A
 ///
@@ -25,17 +25,18 @@ inline constexpr double kHessianFloor = 0.01;
 ///
 /// If det J <= 0 (infeasible), the energy is +infinity and the derivatives are zero. Never NaN for finite J.
 struct DistortionBatch {
-  alignas(64) double jacobian[9][kLanes];    ///< in: J row by row; rows are world x, y, z, columns reference directions
-  alignas(64) double energy[kLanes];         ///< e(J), dimensionless, >= 0
-  alignas(64) double stress[9][kLanes];      ///< de/dJ, laid out like J
-  alignas(64) double u[9][kLanes];           ///< left singular vectors (columns)
-  alignas(64) double v[9][kLanes];           ///< right singular vectors (columns)
-  alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
-  alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
-  alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
+  /// In: J row by row; rows are world x, y, z, columns reference directions.
+  alignas(64) double jacobian[9][kSimdLanes];
+  alignas(64) double energy[kSimdLanes];         ///< e(J), dimensionless, >= 0
+  alignas(64) double stress[9][kSimdLanes];      ///< de/dJ, laid out like J
+  alignas(64) double u[9][kSimdLanes];           ///< left singular vectors (columns)
+  alignas(64) double v[9][kSimdLanes];           ///< right singular vectors (columns)
+  alignas(64) double stretch[3][kSimdLanes];     ///< clamped stretch_i
+  alignas(64) double pair_same[3][kSimdLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
+  alignas(64) double pair_cross[3][kSimdLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
   /// Clamped coupling of u_i v_i^T and u_j v_j^T for (0,1), (1,2), (2,0). Not written for Hencky, which has none.
-  alignas(64) double coupling[3][kLanes];
-  double floor = kHessianFloor;              ///< in: floor of the eigenvalues of the second derivative; -infinity: none
+  alignas(64) double coupling[3][kSimdLanes];
+  double floor = kHessianFloor;  ///< in: floor of the eigenvalues of the second derivative; -infinity: none
 };
 
 /// The kernels of one distortion. Each also fills what the ones before it fill. Several batches are worked on in pairs,

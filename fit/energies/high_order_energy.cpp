@@ -89,17 +89,17 @@ void HighOrderEnergy::rebuild_groups() {
     }
     group.make_tables(space.basis(), rule_);
     group.local_begin = local_size;
-    for (std::size_t i = 0; i < cells.size(); i += kLanes) {
+    for (std::size_t i = 0; i < cells.size(); i += kSimdLanes) {
       auto& batch = group.batches.emplace_back();
-      group.active.push_back(static_cast<int>(std::min<std::size_t>(kLanes, cells.size() - i)));
-      group.nodes.resize(group.nodes.size() + group.num_modes * kLanes, kNoIndex);
+      group.active.push_back(static_cast<int>(std::min<std::size_t>(kSimdLanes, cells.size() - i)));
+      group.nodes.resize(group.nodes.size() + group.num_modes * kSimdLanes, kNoIndex);
       group.signs.resize(group.nodes.size(), 0);
-      const std::size_t first = (group.batches.size() - 1) * group.num_modes * kLanes;
-      for (int l = 0; l < kLanes; ++l) {
+      const std::size_t first = (group.batches.size() - 1) * group.num_modes * kSimdLanes;
+      for (int l = 0; l < kSimdLanes; ++l) {
         const Index c = batch[l] = cells[std::min(i + l, cells.size() - 1)];
         const auto modes = space.modes(c);
         for (std::size_t a = 0; a < modes.size(); ++a) {
-          const std::size_t place = first + group.mode_number(modes[a]) * kLanes + l;
+          const std::size_t place = first + group.mode_number(modes[a]) * kSimdLanes + l;
           group.nodes[place] = space.nodes(c)[a];
           group.signs[place] = space.signs(c)[a];
         }
@@ -121,7 +121,7 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
 #pragma omp parallel for schedule(static) reduction(min : bad_cell)
   for (std::size_t b = 0; b < group.batches.size(); ++b)
     for (std::size_t q = 0; q < per_batch; ++q)
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         const Index cell = group.batches[b][l];
         Mat3 inverse;
         if (reference_) {
@@ -146,7 +146,7 @@ void HighOrderEnergy::find_incidences() {
       for (std::size_t b = 0; b < group.batches.size(); ++b)
         for (std::size_t a = 0; a < group.num_modes; ++a)
           for (int l = 0; l < group.active[b]; ++l) {
-            const std::size_t at = (b * group.num_modes + a) * kLanes + l;
+            const std::size_t at = (b * group.num_modes + a) * kSimdLanes + l;
             if (group.nodes[at] == kNoIndex) continue;
             const auto place = static_cast<std::int64_t>(group.local_begin + 3 * (at - l) + l);
             f(group.nodes[at], group.signs[at] > 0 ? place : ~place);
@@ -208,15 +208,15 @@ void HighOrderEnergy::gather_nodes(double scale, std::span<Vec3> out) const {
     for (std::size_t i = incidence_offsets_[node]; i < incidence_offsets_[node + 1]; ++i) {
       const std::int64_t signed_place = incidences_[i], place = signed_place < 0 ? ~signed_place : signed_place;
       const double sign = signed_place < 0 ? -1 : 1;
-      for (int r = 0; r < 3; ++r) sum[r] += sign * local_[place + r * kLanes];
+      for (int r = 0; r < 3; ++r) sum[r] += sign * local_[place + r * kSimdLanes];
     }
     out[node] += scale * sum;
   }
 }
 
 void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std::vector<Wide>& coefficients) const {
-  std::copy_n(reinterpret_cast<const double*>(coefficients.data()), coefficients.size() * kLanes,
-              local_.data() + group.local_begin + 3 * batch * group.num_modes * kLanes);
+  std::copy_n(reinterpret_cast<const double*>(coefficients.data()), coefficients.size() * kSimdLanes,
+              local_.data() + group.local_begin + 3 * batch * group.num_modes * kSimdLanes);
 }
 
 /// Returns the energy at the nodes, using kernel(batches, count) at all points. With kBack, the contributions of the
@@ -376,7 +376,7 @@ void HighOrderEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap&
     for (std::size_t b = 0; b < group.batches.size(); ++b)
       for (std::size_t a = 0; a < group.num_modes; ++a)
         for (int l = 0; l < group.active[b]; ++l) {
-          const Index node = group.nodes[(b * group.num_modes + a) * kLanes + l];
+          const Index node = group.nodes[(b * group.num_modes + a) * kSimdLanes + l];
           if (node == kNoIndex) continue;
           for (int pair = 0; pair < 6; ++pair)
             for (int e = 0; e < 9; ++e)
@@ -493,7 +493,7 @@ void HighOrderEnergy::least_determinants(std::span<const Vec3> nodes, std::span<
   if (least.size() != space_->num_cells()) throw InputError("HighOrderEnergy: expected one place per cell");
   std::ranges::fill(least, std::numeric_limits<double>::infinity());
   integrate<false>(nodes, 0, [&](std::size_t g, std::size_t b, std::size_t, const DistortionBatch& batch) {
-    for (int l = 0; l < kLanes; ++l) {
+    for (int l = 0; l < kSimdLanes; ++l) {
       Mat3 j;
       for (int e = 0; e < 9; ++e) j(e / 3, e % 3) = batch.jacobian[e][l];
       double& lowest = least[groups_[g].batches[b][l]];
@@ -503,7 +503,8 @@ void HighOrderEnergy::least_determinants(std::span<const Vec3> nodes, std::span<
 }
 
 void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasis) {
-  if (!(emphasis >= 0 && emphasis <= kMostEmphasis)) throw InputError("HighOrderEnergy: emphasis is out of range");
+  if (!(emphasis >= 0 && emphasis <= kMostHighOrderEmphasis))
+    throw InputError("HighOrderEnergy: emphasis is out of range");
   emphasis_ = emphasis;
   weigh_points(nodes);
 }
@@ -518,11 +519,11 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
   for (const CellGroup& group : groups_) {
     auto& of_group = weights.emplace_back(group.num_points() * group.batches.size(), Wide{} + 1.0);
     for (std::size_t i = 0; i < of_group.size() && !cell_weights_.empty(); ++i)
-      for (int l = 0; l < kLanes; ++l) of_group[i][l] = cell_weights_[group.batches[i / group.num_points()][l]];
+      for (int l = 0; l < kSimdLanes; ++l) of_group[i][l] = cell_weights_[group.batches[i / group.num_points()][l]];
   }
   const auto weigh = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     Wide& weight = weights[g][b * groups_[g].num_points() + q];
-    for (int l = 0; l < kLanes; ++l) {
+    for (int l = 0; l < kSimdLanes; ++l) {
       Mat3 f;
       for (int e = 0; e < 9; ++e) f(e / 3, e % 3) = batch.jacobian[e][l];
       const double shape = f.determinant() / (f.col(0).norm() * f.col(1).norm() * f.col(2).norm());

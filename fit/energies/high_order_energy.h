@@ -88,8 +88,8 @@ class HighOrderEnergy final : public RegularizedTerm {
   /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  static constexpr double kMostEmphasis = 1024;  // largest k allowed; lifts end at 512 (`kEmphases`)
-  /// Sets k and weighs points by their shapes at these nodes. InputError: k is not in [0, kMostEmphasis].
+  static constexpr double kMostHighOrderEmphasis = 1024;  // largest k allowed; lifts end at 512 (`kEmphases`)
+  /// Sets k and weighs points by their shapes at these nodes. InputError: k is not in [0, kMostHighOrderEmphasis].
   void emphasize_poor(std::span<const Vec3> nodes, double emphasis);
   /// Sets w_h and t. InputError: a weight that is negative or not finite, a threshold above 1.
   void set_hinge(double weight, double threshold);

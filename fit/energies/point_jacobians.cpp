@@ -22,7 +22,7 @@ PointJacobians::PointJacobians(const ElementRule& rule)
     : num_corners_(static_cast<std::size_t>(cell_topology(rule.kind).num_vertices)),
       num_groups_((rule.num_points() + kWide - 1) / kWide),
       gradients_(num_groups_ * 3 * num_corners_ * kWide) {
-  assert(num_groups_ * kWide <= kMostValues);
+  assert(num_groups_ * kWide <= kMostPointJacobians);
   for (std::size_t value = 0; value < num_groups_ * kWide; ++value)
     for (const ElementRule::Entry& entry : rule.point(std::min(value, rule.num_points() - 1)))
       for (std::size_t k = 0; k < 3; ++k) {
@@ -50,7 +50,7 @@ void PointJacobians::evaluate(const Vec3* corners, double least_length, double* 
 }
 
 double PointJacobians::least(const Vec3* corners, double least_length) const {
-  std::array<double, kMostValues> values;
+  std::array<double, kMostPointJacobians> values;
   evaluate(corners, least_length, values.data());
   return *std::min_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kWide * num_groups_));
 }

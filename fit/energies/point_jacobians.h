@@ -14,10 +14,10 @@ namespace subvol::internal {
 class PointJacobians {
  public:
   /// Largest number of values, with those that fill the last eight.
-  static constexpr std::size_t kMostValues = 128;
+  static constexpr std::size_t kMostPointJacobians = 128;
 
   PointJacobians() = default;
-  /// The rule has at most `kMostValues` points.
+  /// The rule has at most `kMostPointJacobians` points.
   explicit PointJacobians(const ElementRule& rule);
 
   /// Writes the values at all points to `values`, and repeats the last one until their number is a multiple of eight.

@@ -18,20 +18,21 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr int kPoints = 3, kDensePoints = 5;  // per direction, the corners among them; dense after `densify`
-constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
-constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
+// Per direction, the corners among them; dense after `densify`.
+constexpr int kQualityPointsPerDirection = 3, kDensePoints = 5;
+constexpr double kInnerWeight = 1.0 / 16;       // a_q of points that are no corners
+constexpr double kLeastDirectionLength = 1e-9;  // lengths of directions are not below this share of the cell's
 // The energy uses a larger share, which bounds its derivatives. A folded cell had a direction of length 1e-7 at a
 // point; its Hessian was 1e13 times that of other cells, and no vertex of the patch around it moved.
 constexpr double kLeastEnergyLength = 0.05;
-constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
-constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this,
-constexpr double kLeastGoal = 0.01;        // but not below this: caps are 0 where edges are flat
-constexpr double kLeastShare = -1;         // of a goal; no inverted cell is worse than another one
-constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
+constexpr double kNoCap = 1;            // scaled Jacobians are at most 1
+constexpr double kBelowCap = 0.02;      // goals at caps are lower than the caps by this,
+constexpr double kLeastGoal = 0.01;     // but not below this: caps are 0 where edges are flat
+constexpr double kLeastGoalShare = -1;  // no inverted cell is worse than another one
+constexpr double kFoldGoal = 0.5;       // residual of a fold that is good enough: 330 degrees if the limit is 300
 /// Factors on the emphasis of a cell that is below its goal, or above it, and the largest emphasis. It rises within a
 /// few rounds and falls slowly, so that a cell which has just reached its goal stays there.
-constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
+constexpr double kCellEmphasisRaise = 2.5, kCellEmphasisFall = 0.97, kMostCellEmphasis = 1000;
 
 constexpr double kSamePlace = 1e-12;  // in canonical coordinates
 
@@ -147,7 +148,7 @@ QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengt
     if (!(h.minCoeff() > 0) || !h.allFinite())
       throw InputError("QualityEnergy: lengths must be positive and finite");
   for (int kind = 0; kind < kNumCellKinds; ++kind)
-    points_[kind] = {make_points(static_cast<CellKind>(kind), kPoints),
+    points_[kind] = {make_points(static_cast<CellKind>(kind), kQualityPointsPerDirection),
                      make_points(static_cast<CellKind>(kind), kDensePoints)};
   const std::vector<int> colors = color_cells(mesh);
   const int num_colors = colors.empty() ? 0 : *std::max_element(colors.begin(), colors.end()) + 1;
@@ -248,14 +249,14 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
     energy += weight * residual * residual;
     if constexpr (kDerivatives) sums.add(points.rule.point(q), weight, residual, derivatives);
   };
-  std::array<double, PointJacobians::kMostValues> jacobians;
+  std::array<double, PointJacobians::kMostPointJacobians> jacobians;
   points.jacobians.evaluate(x.data(), least_length, jacobians.data());
   for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
-    constexpr double kRounding = 1e-9;  // more than `Frame` and `PointJacobians` differ by
+    constexpr double kPointJacobianRounding = 1e-9;  // more than `Frame` and `PointJacobians` differ by
     const int corner = points.corner[q];
     const double threshold = std::min(weights_.threshold, cap(cell, points, q));
     const bool has_hinge_only = corner < 0 && mesh_->kinds[cell] != CellKind::tet;
-    if (has_hinge_only && jacobians[q] > threshold + kRounding) continue;
+    if (has_hinge_only && jacobians[q] > threshold + kPointJacobianRounding) continue;
     const Frame frame(points.rule.point(q), x.data(), least_length);
     const double below = threshold - frame.s;
     if (below > 0) {
@@ -408,7 +409,7 @@ double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& poin
   const auto vertices = mesh_->cell(cell);
   std::array<Vec3, kMaxCellVertices> x;
   for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
-  const double least_length = kLeastLength * lengths_[cell].minCoeff();
+  const double least_length = kLeastDirectionLength * lengths_[cell].minCoeff();
   return std::min(1.0, points.jacobians.least(x.data(), least_length));
 }
 
@@ -435,7 +436,8 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
 QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, double goal) {
   std::vector<double> least(mesh_->num_cells()), shares(mesh_->num_cells());
   const auto update = [](double share, double& emphasis) {
-    emphasis = share < 1 ? std::min(kMostEmphasis, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
+    emphasis = share < 1 ? std::min(kMostCellEmphasis, kCellEmphasisRaise * emphasis)
+                         : std::max(1.0, kCellEmphasisFall * emphasis);
   };
 #pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < least.size(); ++c) {
@@ -446,11 +448,11 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
     double inner = 1, all = 1;
     least[c] = 1;
     for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
-      const Frame frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff());
+      const Frame frame(points.rule.point(q), x.data(), kLeastDirectionLength * lengths_[c].minCoeff());
       const double s = frame.s;
       const double at_cap = cap(c, points, q);
       const double own_goal = at_cap < kNoCap ? std::min(goal, std::max(kLeastGoal, at_cap - kBelowCap)) : goal;
-      double share = std::clamp(s / own_goal, kLeastShare, 1.0);
+      double share = std::clamp(s / own_goal, kLeastGoalShare, 1.0);
       if (live_edge_ > 0 && points.corner[q] >= 0)
         for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (live_edge_ * lengths_[c][k]));
       least[c] = std::min(least[c], s);

@@ -43,12 +43,13 @@ SignedSingularValues signed_values(const Singular& singular, int lane) {
   for (int i = 0; i < 2; ++i) result.v.col(i) = v.col(order[i]);
   result.v.col(2) = result.v.col(0).cross(result.v.col(1));
   const Vec3 first = jv.col(order[0]), second = jv.col(order[1]);
-  constexpr double kNone = 1e-140;  // singular values below it are 0: their squares vanish in double precision
+  constexpr double kLeastSingularValue = 1e-140;  // smaller ones are 0: their squares vanish in double precision
   result.s[0] = first.norm();
-  result.u.col(0) = result.s[0] > kNone ? Vec3(first / result.s[0]) : Vec3(Vec3::UnitX());
+  result.u.col(0) = result.s[0] > kLeastSingularValue ? Vec3(first / result.s[0]) : Vec3(Vec3::UnitX());
   const Vec3 across = second - result.u.col(0).dot(second) * result.u.col(0);
   result.s[1] = across.norm();
-  result.u.col(1) = result.s[1] > kNone ? Vec3(across / result.s[1]) : Vec3(result.u.col(0).unitOrthogonal());
+  result.u.col(1) =
+      result.s[1] > kLeastSingularValue ? Vec3(across / result.s[1]) : Vec3(result.u.col(0).unitOrthogonal());
   result.u.col(2) = result.u.col(0).cross(result.u.col(1));
   const double sign = result.v.col(2).dot(v.col(order[2])) < 0 ? -1 : 1;
   result.s[2] = sign * result.u.col(2).dot(jv.col(order[2]));
@@ -58,10 +59,10 @@ SignedSingularValues signed_values(const Singular& singular, int lane) {
 /// Evaluates the barrier for a batch of another form, and copies its value and first derivative there.
 RegularizedBatch evaluated(DistortionBatch& batch, double epsilon) {
   RegularizedBatch barrier;
-  for (int k = 0; k < 9; ++k) std::copy_n(batch.jacobian[k], kLanes, barrier.jacobian[k]);
+  for (int k = 0; k < 9; ++k) std::copy_n(batch.jacobian[k], kSimdLanes, barrier.jacobian[k]);
   regularized_barrier(barrier, epsilon);
-  std::copy_n(barrier.energy, kLanes, batch.energy);
-  for (int k = 0; k < 9; ++k) std::copy_n(barrier.stress[k], kLanes, batch.stress[k]);
+  std::copy_n(barrier.energy, kSimdLanes, batch.energy);
+  for (int k = 0; k < 9; ++k) std::copy_n(barrier.stress[k], kSimdLanes, batch.stress[k]);
   return barrier;
 }
 
@@ -74,7 +75,7 @@ void fill_second(const RegularizedBatch& barrier, DistortionBatch& batch) {
   for (int k = 0; k < 9; ++k) j[k] = square > kLeastSquare ? j[k] : wide(k % 4 == 0 ? 1e-90 : 0.0);
   Singular singular;
   decompose(j, singular);
-  for (int l = 0; l < kLanes; ++l) {
+  for (int l = 0; l < kSimdLanes; ++l) {
     const auto [u, v, s] = signed_values(singular, l);
     const Vec3 c(s[1] * s[2], s[2] * s[0], s[0] * s[1]);
     const double alpha = barrier.alpha[l], beta = barrier.beta[l], gamma = barrier.gamma[l];
@@ -103,10 +104,11 @@ void regularized_hessian(DistortionBatch* batches, int count, double epsilon) {
 }
 
 void regularized_barrier(RegularizedBatch& batch, double epsilon) {
-  const double (&j)[9][kLanes] = batch.jacobian;
-  alignas(64) double power[kLanes], chi[kLanes], slope[kLanes], determinant[kLanes], squared[kLanes];
+  const double(&j)[9][kSimdLanes] = batch.jacobian;
+  alignas(64) double power[kSimdLanes], chi[kSimdLanes], slope[kSimdLanes], determinant[kSimdLanes],
+      squared[kSimdLanes];
 #pragma omp simd
-  for (int l = 0; l < kLanes; ++l) {
+  for (int l = 0; l < kSimdLanes; ++l) {
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
         const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
@@ -117,7 +119,7 @@ void regularized_barrier(RegularizedBatch& batch, double epsilon) {
     for (int k = 0; k < 9; ++k) sum += j[k][l] * j[k][l];
     squared[l] = sum;
   }
-  for (int l = 0; l < kLanes; ++l) {
+  for (int l = 0; l < kSimdLanes; ++l) {
     const double root = std::hypot(epsilon, determinant[l]);
     // Far on the inverted side chi underflows; the energy is huge there with this bound, too.
     chi[l] = std::max(chi_of(determinant[l], root, epsilon), 1e-60);
@@ -126,7 +128,7 @@ void regularized_barrier(RegularizedBatch& batch, double epsilon) {
     power[l] = 1 / (cube_root * cube_root);
   }
 #pragma omp simd
-  for (int l = 0; l < kLanes; ++l) {
+  for (int l = 0; l < kSimdLanes; ++l) {
     const double d = determinant[l], inverse = 1 / chi[l], relative = slope[l] * inverse;  // d ln chi / dD
     const double shape = kShapeWeight * squared[l] * power[l], size = kSizeWeight * (d * d + 1) * inverse;
     batch.energy[l] = shape + size;

@@ -7,7 +7,7 @@
 namespace subvol::internal {
 
 /// Distortion energy that is finite for every Jacobian, including inverted ones, and tends to a barrier as eps tends to
-/// 0; kLanes at once.
+/// 0; kSimdLanes at once.
 ///
 ///   e_eps(J) = 1/4 |J|^2 / chi^(2/3) + 1/6 (D^2 + 1) / chi,  D = det J
 ///   chi(D, eps) = (D + sqrt(eps^2 + D^2)) / 2
@@ -23,11 +23,11 @@ namespace subvol::internal {
 ///
 /// Finite for finite J and eps > 0; no value is NaN.
 struct RegularizedBatch {
-  alignas(64) double jacobian[9][kLanes];                     ///< in: laid out as in `DistortionBatch`
-  alignas(64) double energy[kLanes];                          ///< > 0
-  alignas(64) double stress[9][kLanes];                       ///< de/dJ
-  alignas(64) double cofactor[9][kLanes];                     ///< C
-  alignas(64) double alpha[kLanes], beta[kLanes], gamma[kLanes];
+  alignas(64) double jacobian[9][kSimdLanes];  ///< in: laid out as in `DistortionBatch`
+  alignas(64) double energy[kSimdLanes];       ///< > 0
+  alignas(64) double stress[9][kSimdLanes];    ///< de/dJ
+  alignas(64) double cofactor[9][kSimdLanes];  ///< C
+  alignas(64) double alpha[kSimdLanes], beta[kSimdLanes], gamma[kSimdLanes];
 };
 
 /// Fills everything. epsilon > 0, dimensionless.

@@ -62,7 +62,7 @@ struct Symmetric {
 /// det C / 2. With the sign of p that makes r >= 0 the first of them differs from the others by at least sqrt 3, so
 /// that its eigenvector is well-conditioned, and the adjugate of C - 2 cos t I is v v^T times 6 to 9.
 [[gnu::always_inline]] inline void isolated_eigenvector(const Symmetric& a, Wide* vector) {
-  constexpr double kLeast = 1e-60;  // of |A - q I|^2, so that nothing is divided by zero
+  constexpr double kLeastDeviatorSquare = 1e-60;  // of |A - q I|^2, so that nothing is divided by zero
   Symmetric m = a;
   const Wide mean = (1.0 / 3) * (a.diagonal[0] + a.diagonal[1] + a.diagonal[2]);
   Wide square = Wide{}, mixed = Wide{};
@@ -71,7 +71,7 @@ struct Symmetric {
     square += m.diagonal[i] * m.diagonal[i];
     mixed += m.coupled[i] * m.coupled[i];
   }
-  const Wide inverse = reciprocal_square_root((1.0 / 6) * square + (1.0 / 3) * mixed + kLeast);
+  const Wide inverse = reciprocal_square_root((1.0 / 6) * square + (1.0 / 3) * mixed + kLeastDeviatorSquare);
   const Wide r = 0.5 * determinant(m) * (inverse * inverse * inverse);
   const Wide scale = r < 0 ? -inverse : inverse, eigenvalue = 2 * cosine_of_third(absolute(r));
   for (int i = 0; i < 3; ++i) {

@@ -16,13 +16,13 @@ namespace subvol::internal {
 class StepLimit {
  public:
   explicit StepLimit(double limit) {
-    for (int n = 0; n <= kMaxSteps; ++n) step_[n] = limit * std::pow(kShrink, n);
+    for (int n = 0; n <= kMostStepReductions; ++n) step_[n] = limit * std::pow(kStepReduction, n);
   }
 
   void admit(const Mat3& j, const Mat3& d) {
     const Path path(j, d);
     int n = steps_.load(std::memory_order_relaxed);
-    while (n < kMaxSteps && !path.safe(step_[n])) ++n;
+    while (n < kMostStepReductions && !path.safe(step_[n])) ++n;
     int seen = steps_.load(std::memory_order_relaxed);
     while (seen < n && !steps_.compare_exchange_weak(seen, n)) {
     }
@@ -34,14 +34,14 @@ class StepLimit {
   static bool safe(const Mat3& j, const Mat3& d, double t) { return Path(j, d).safe(t); }
 
  private:
-  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3. It is positive on [0, t] if its four Bernstein
-  /// coefficients there are; the first of them is c0, positive because det J > 0.
+  /// det(J + t D) - kKeptDeterminantShare det J = c0 + c1 t + c2 t^2 + c3 t^3. It is positive on [0, t] if its four
+  /// Bernstein coefficients there are; the first of them is c0, positive because det J > 0.
   struct Path {
     double c0, c1, c2, c3;
     Path(const Mat3& j, const Mat3& d) {
       const Vec3 j12 = j.col(1).cross(j.col(2)), d12 = d.col(1).cross(d.col(2));
       const Vec3 mixed = j.col(1).cross(d.col(2)) + d.col(1).cross(j.col(2));
-      c0 = (1 - kKept) * j.col(0).dot(j12);
+      c0 = (1 - kKeptDeterminantShare) * j.col(0).dot(j12);
       c1 = d.col(0).dot(j12) + j.col(0).dot(mixed);
       c2 = d.col(0).dot(mixed) + j.col(0).dot(d12);
       c3 = d.col(0).dot(d12);
@@ -52,10 +52,10 @@ class StepLimit {
     }
   };
   // Ratio of successive steps, and the share of a determinant that a step must leave.
-  static constexpr double kShrink = 0.8, kKept = 0.1;
-  static constexpr int kMaxSteps = 200;
-  std::array<double, kMaxSteps + 1> step_;  // a table, so that all threads use the same bits of a step
-  std::atomic<int> steps_{0};               // step_[steps_] is safe for every pair seen so far
+  static constexpr double kStepReduction = 0.8, kKeptDeterminantShare = 0.1;
+  static constexpr int kMostStepReductions = 200;
+  std::array<double, kMostStepReductions + 1> step_;  // a table, so that all threads use the same bits of a step
+  std::atomic<int> steps_{0};                         // step_[steps_] is safe for every pair seen so far
 };
 
 }  // namespace subvol::internal

@@ -71,10 +71,10 @@ void VolumeEnergy::rebuild_groups() {
     group.rule = make_element_rule(static_cast<CellKind>(key.first), key.second);
     group.color_offsets.assign(1, 0);
     for (const std::vector<Index>& cells : by_color) {
-      for (std::size_t i = 0; i < cells.size(); i += kLanes) {
+      for (std::size_t i = 0; i < cells.size(); i += kSimdLanes) {
         auto& batch = group.batches.emplace_back();
-        for (std::size_t l = 0; l < kLanes; ++l) batch[l] = cells[std::min(i + l, cells.size() - 1)];
-        group.active.push_back(static_cast<int>(std::min<std::size_t>(kLanes, cells.size() - i)));
+        for (std::size_t l = 0; l < kSimdLanes; ++l) batch[l] = cells[std::min(i + l, cells.size() - 1)];
+        group.active.push_back(static_cast<int>(std::min<std::size_t>(kSimdLanes, cells.size() - i)));
       }
       group.color_offsets.push_back(group.batches.size());
     }
@@ -85,28 +85,28 @@ void VolumeEnergy::rebuild_groups() {
 void VolumeEnergy::fill_references(Group& group) const {
   const std::size_t num_points = group.rule.num_points();
   const Mat3 ideal = ideal_matrix(group.rule.kind);
-  group.to_reference.resize(group.batches.size() * num_points * 9 * kLanes);
-  constexpr Index kNone = std::numeric_limits<Index>::max();
-  Index bad_cell = kNone;
+  group.to_reference.resize(group.batches.size() * num_points * 9 * kSimdLanes);
+  constexpr Index kNoBadCell = std::numeric_limits<Index>::max();
+  Index bad_cell = kNoBadCell;
 #pragma omp parallel for schedule(static) reduction(min : bad_cell)
   for (std::size_t b = 0; b < group.batches.size(); ++b)
     for (std::size_t q = 0; q < num_points; ++q)
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         const Mat3 reference = reference_(group.batches[b][l], group.rule.points[q]);
         const Mat3 to_reference = ideal * reference.inverse();
         if (!(reference.determinant() > 0) || !to_reference.allFinite())
           bad_cell = std::min(bad_cell, group.batches[b][l]);
         for (int e = 0; e < 9; ++e)
-          group.to_reference[(9 * (b * num_points + q) + e) * kLanes + l] = to_reference(e / 3, e % 3);
+          group.to_reference[(9 * (b * num_points + q) + e) * kSimdLanes + l] = to_reference(e / 3, e % 3);
       }
-  if (bad_cell != kNone)
+  if (bad_cell != kNoBadCell)
     throw InputError("VolumeEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 
 void VolumeEnergy::gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes,
-                          double (*x)[3][kLanes]) const {
+                          double (*x)[3][kSimdLanes]) const {
   const int n = cell_topology(group.rule.kind).num_vertices;
-  for (int l = 0; l < kLanes; ++l) {
+  for (int l = 0; l < kSimdLanes; ++l) {
     const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[group.batches[batch][l]];
     for (int a = 0; a < n; ++a)
       for (int r = 0; r < 3; ++r) x[a][r][l] = nodes[corners[a]][r];
@@ -132,12 +132,12 @@ double VolumeEnergy::sum_batches(PerBatch&& per_batch) const {
 
 /// Corners and ideal cells of one batch.
 struct VolumeEnergy::BatchState {
-  alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[3][kLanes];
+  alignas(64) double x[kMaxCellVertices][3][kSimdLanes], inverse_h[3][kSimdLanes];
 
   BatchState(const VolumeEnergy& energy, const Group& group, std::size_t batch, std::span<const Vec3> nodes) {
     energy.gather(group, batch, nodes, x);
     for (int c = 0; c < 3; ++c)
-      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = energy.inverse_lengths_[group.batches[batch][l]][c];
+      for (int l = 0; l < kSimdLanes; ++l) inverse_h[c][l] = energy.inverse_lengths_[group.batches[batch][l]][c];
   }
 };
 
@@ -180,12 +180,12 @@ double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
-    alignas(64) double g[kMaxCellVertices][3][kLanes] = {}, factor[3][kLanes];
+    alignas(64) double g[kMaxCellVertices][3][kSimdLanes] = {}, factor[3][kSimdLanes];
     Kernel kernel(epsilon_, *kernels_, floor_);
     double sum = 0;
     for_points(group, b, state, kernel, &Kernel::evaluate_gradient, [&](std::size_t q, auto& batch) {
       if (reference_) multiply_lanes_transposed(batch.stress, group.reference(b, q));
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
         if (l < group.active[b]) sum += w * batch.energy[l];
@@ -212,16 +212,17 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
   return sum_batches([&](const Group& group, std::size_t b) {
     constexpr int n_max = kMaxCellVertices;
     const BatchState state(*this, group, b, nodes);
-    alignas(64) double g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], factor[3][kLanes], weight[kLanes];
+    alignas(64) double g[n_max][3][kSimdLanes] = {}, k[n_max * n_max][9][kSimdLanes], factor[3][kSimdLanes],
+                       weight[kSimdLanes];
     Kernel kernel(epsilon_, *kernels_, floor_);
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int a = 0; a < n; ++a)
-      for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
+      for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kSimdLanes, 0.0);
     double sum = 0;
     for_points(group, b, state, kernel, &Kernel::evaluate_hessian, [&](std::size_t q, auto& batch) {
-      const double(*reference)[kLanes] = reference_ ? group.reference(b, q) : nullptr;
+      const double(*reference)[kSimdLanes] = reference_ ? group.reference(b, q) : nullptr;
       if (reference) multiply_lanes_transposed(batch.stress, reference);
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
@@ -237,7 +238,7 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
       for (int a = 0; a < n; ++a) {
         gradient[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
         for (int c = a; c < n; ++c) {
-          const double (*block)[kLanes] = k[a * n_max + c];
+          const double(*block)[kSimdLanes] = k[a * n_max + c];
           float* upper = hessian.block(slots[a * n + c]);
           for (int e = 0; e < 9; ++e) upper[e] += static_cast<float>(block[e][l]);
           if (c == a) continue;
@@ -293,7 +294,7 @@ void VolumeEnergy::least_determinants(std::span<const Vec3> nodes, std::span<dou
   std::fill(least.begin(), least.end(), kInfinity);
   sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
-    alignas(64) double jacobian[9][kLanes];
+    alignas(64) double jacobian[9][kSimdLanes];
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, jacobian);
       if (reference_) multiply_lanes(jacobian, group.reference(b, q));
@@ -333,15 +334,15 @@ double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3>
   if (epsilon_ > 0) return limit;
   StepLimit steps(limit);
   sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[3][kLanes];
-    double jx[9][kLanes], jd[9][kLanes];
-    std::fill_n(&ones[0][0], 3 * kLanes, 1.0);
+    alignas(64) double x[kMaxCellVertices][3][kSimdLanes], d[kMaxCellVertices][3][kSimdLanes], ones[3][kSimdLanes];
+    double jx[9][kSimdLanes], jd[9][kSimdLanes];
+    std::fill_n(&ones[0][0], 3 * kSimdLanes, 1.0);
     gather(group, b, nodes, x);
     gather(group, b, direction, d);
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, ones, jx);
       jacobians(group.rule.point(q), d, ones, jd);
-      for (int l = 0; l < kLanes; ++l) {
+      for (int l = 0; l < kSimdLanes; ++l) {
         Mat3 j, e;
         for (int k = 0; k < 9; ++k) {
           j(k / 3, k % 3) = jx[k][l];

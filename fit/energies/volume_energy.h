@@ -67,18 +67,18 @@ class VolumeEnergy final : public RegularizedTerm {
   BlockSparse pattern() const { return blocks_.zero_matrix(); }
 
  private:
-  /// Cells of one kind and rule; `batches` hold kLanes of them, the last one of each color padded with repeats.
+  /// Cells of one kind and rule; `batches` hold kSimdLanes of them, the last one of each color padded with repeats.
   struct Group {
     ElementRule rule;
-    std::vector<std::array<Index, kLanes>> batches;
+    std::vector<std::array<Index, kSimdLanes>> batches;
     std::vector<int> active;                 ///< number of cells in each batch without padding
     std::vector<std::size_t> color_offsets;  ///< first batch of each color, and the number of batches
     /// Change from the ideal to the reference shape, A_ideal A^-1, per batch and point, row by row, each entry in
-    /// kLanes lanes; empty: ideal cells.
+    /// kSimdLanes lanes; empty: ideal cells.
     std::vector<double> to_reference;
-    const double (*reference(std::size_t batch, std::size_t q) const)[kLanes] {
-      return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() +
-                                                       9 * kLanes * (batch * rule.num_points() + q));
+    const double (*reference(std::size_t batch, std::size_t q) const)[kSimdLanes] {
+      return reinterpret_cast<const double(*)[kSimdLanes]>(to_reference.data() +
+                                                           9 * kSimdLanes * (batch * rule.num_points() + q));
     }
   };
 
@@ -96,7 +96,7 @@ class VolumeEnergy final : public RegularizedTerm {
                     BlockSparse& hessian) const;
   void rebuild_groups();
   void fill_references(Group& group) const;
-  void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
+  void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kSimdLanes]) const;
   template <class PerBatch>
   double sum_batches(PerBatch&& per_batch) const;
 

@@ -18,10 +18,11 @@ namespace {
 /// Most refinements of the boundary for samples, on the finest level and on those below, which follow the target only
 /// roughly.
 constexpr int kMaxSampleRefinements = 3, kMaxCoarseRefinements = 1;
-/// kMeshShare: position of the finest level's samples between the limit surface (0) and the mesh (1). kMostGap: largest
-/// mean gap between the two for which the mesh is considered (in the mesh's unit; in a fit, shares of the target's
-/// diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit surface away from it.
-constexpr double kMeshShare = 0.3, kMostGap = 5e-4;
+/// kMeshShare: position of the finest level's samples between the limit surface (0) and the mesh (1).
+/// kMostMeshLimitGap: largest mean gap between the two for which the mesh is considered (in the mesh's unit; in a fit,
+/// shares of the target's diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit
+/// surface away from it.
+constexpr double kMeshShare = 0.3, kMostMeshLimitGap = 5e-4;
 
 /// Takes the vertices of the boundary and of interfaces of a hex mesh as samples, without the limit map.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
@@ -120,7 +121,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     double gap = 0;
     for (std::size_t i = 0; i < on_limit.size(); ++i) gap += (on_limit[i] - on_mesh[i]).norm();
     // A tolerance applies to both surfaces.
-    if (options.tolerance_percent || gap <= kMostGap * static_cast<double>(on_limit.size()))
+    if (options.tolerance_percent || gap <= kMostMeshLimitGap * static_cast<double>(on_limit.size()))
       towards_mesh = compose(bilinear, level.nodes);
   }
   if (!towards_mesh) boundary = refine_sheets(level.mesh, finest ? std::max(refinements, 1) : refinements);
@@ -138,10 +139,10 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
 }
 
 int limit_refinements(const VolumeMesh& mesh) {
-  constexpr int kMost = 2;                        // refinements of each face
+  constexpr int kMostLimitRefinements = 2;        // of each face
   constexpr std::size_t kMostTriangles = 200000;  // beyond it, one refinement less, to bound the time of distances
-  const std::size_t of_two = MeshTopology(mesh).boundary_faces().size() * 2 << 2 * kMost;
-  return of_two > kMostTriangles ? kMost - 1 : kMost;
+  const std::size_t of_two = MeshTopology(mesh).boundary_faces().size() * 2 << 2 * kMostLimitRefinements;
+  return of_two > kMostTriangles ? kMostLimitRefinements - 1 : kMostLimitRefinements;
 }
 
 TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control) {

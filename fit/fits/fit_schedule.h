@@ -15,7 +15,7 @@ inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare =
 /// Largest lambda that is tried if the boundary of a fit intersects itself.
 inline constexpr double kMostUnfoldingLambda = 0.1;
 /// Lambda is not lowered any further if a stage reduces the mean distance by less than this share.
-inline constexpr double kLeastGain = 0.01;
+inline constexpr double kLeastLambdaHalvingGain = 0.01;
 /// Without a tolerance, the largest total decrease of the mean scaled Jacobian that lowering lambda may cause.
 inline constexpr double kMostShapeLoss = 0.0075;
 /// The corresponding limit for cage-only fits, in which few degrees of freedom have to reach the whole surface.

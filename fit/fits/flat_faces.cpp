@@ -72,7 +72,7 @@ std::vector<std::vector<Index>> facets_of_vertices(const VolumeMesh& mesh, const
 std::optional<Vec3> way_to_planes(const Vec3& p, std::span<const Index> list, const FlatFacets& facets,
                                   double tolerance) {
   // Planes that differ in direction by less than the square root of this (3 degrees) are taken for one.
-  constexpr double kIndependent = 3e-3;
+  constexpr double kLeastPlaneEigenvalue = 3e-3;
   Mat3 matrix = Mat3::Zero();
   Vec3 right = Vec3::Zero();
   for (const Index f : list) {
@@ -83,7 +83,7 @@ std::optional<Vec3> way_to_planes(const Vec3& p, std::span<const Index> list, co
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(matrix);
   Vec3 way = Vec3::Zero();
   for (int k = 0; k < 3; ++k)
-    if (solver.eigenvalues()[k] > kIndependent)
+    if (solver.eigenvalues()[k] > kLeastPlaneEigenvalue)
       way += solver.eigenvectors().col(k).dot(right) / solver.eigenvalues()[k] * solver.eigenvectors().col(k);
   for (const Index f : list)
     if (!(std::abs(facets.planes[f].normal.dot(p + way) - facets.planes[f].offset) <= tolerance)) return std::nullopt;
@@ -161,8 +161,8 @@ bool put_back(Flattened& flattened, std::span<const Vec3> before, const QualityR
 /// Moves vertices into their planes, as far as cells allow. tolerance: distance from a plane that counts as in it.
 std::size_t flatten(Flattened flattened, const MeshTopology& topology, std::span<const Index> group,
                     const Closest& closest, const FlatFacets& facets, double tolerance, double least_jacobian) {
-  constexpr double kLongest = 0.1;  // of a vertex's size
-  constexpr int kMostRounds = 20;   // each puts more vertices back; then all are
+  constexpr double kLongestWayToPlanes = 0.1;  // of a vertex's size
+  constexpr int kMostPutBackRounds = 20;       // each puts more vertices back; then all are
   VolumeMesh& mesh = flattened.moved;
   const std::vector<std::vector<Index>> wanted = facets_of_vertices(mesh, topology, group, closest, facets);
   const std::vector<double> sizes = flattened.sizes();
@@ -171,11 +171,11 @@ std::size_t flatten(Flattened flattened, const MeshTopology& topology, std::span
   for (std::size_t v = 0; v < wanted.size(); ++v) {
     if (wanted[v].empty()) continue;
     const std::optional<Vec3> way = way_to_planes(before[v], wanted[v], facets, tolerance);
-    if (way && way->norm() <= kLongest * sizes[v]) mesh.positions[v] += *way;
+    if (way && way->norm() <= kLongestWayToPlanes * sizes[v]) mesh.positions[v] += *way;
   }
   int round = 0;
   while (put_back(flattened, before, quality, std::min(quality.min_scaled_jacobian, least_jacobian)))
-    if (++round == kMostRounds) {
+    if (++round == kMostPutBackRounds) {
       mesh.positions = before;
       break;
     }
@@ -267,13 +267,13 @@ std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target)
         patches.join(static_cast<Index>(i), first_face[e]);
     }
   }
-  constexpr Index kUnknown = -2;
-  std::vector<Index> facet_of_patch(patches.size(), kUnknown);
+  constexpr Index kUnknownFacet = -2;
+  std::vector<Index> facet_of_patch(patches.size(), kUnknownFacet);
   for (std::size_t i = 0; i < patches.size(); ++i) {
     const Index f = interfaces.faces[i];
     const Index facet = facet_of_face(topology.face(f), groups[f], cage, closest, facets);
     Index& common = facet_of_patch[patches.of(static_cast<Index>(i))];
-    common = common == kUnknown || common == facet ? facet : kNoIndex;
+    common = common == kUnknownFacet || common == facet ? facet : kNoIndex;
   }
   std::vector<std::vector<Index>> wanted(cage.num_vertices());
   for (std::size_t i = 0; i < patches.size(); ++i) {

@@ -56,9 +56,9 @@ Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::s
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells, SearchStop* stop) {
   // A row of cells that is cut adds about a hundred cells for each of its own, a block of them 26.
-  constexpr double kLeastAdded = 26, kLess = 0.7;
+  constexpr double kLeastAdded = 26, kFewerCutCellsShare = 0.7;
   const double room = static_cast<double>(most_cells) - static_cast<double>(mesh.num_cells());
-  for (double most = room / kLeastAdded; most >= 1; most *= kLess) {
+  for (double most = room / kLeastAdded; most >= 1; most *= kFewerCutCellsShare) {
     std::vector<char> chosen(mesh.num_cells(), 0);
     most = std::min(most, static_cast<double>(choose(faults, most, chosen)));
     if (most < 1 || (stop && stop->is_stopped())) break;
@@ -83,11 +83,12 @@ std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const doubl
 }
 
 std::vector<Index> cells_between_sizes(std::span<const double> sizes) {
-  constexpr double kRounding = 0.01;  // of the number of times that a cell was cut; 22 parts of one were cut 0.94 times
+  // Of the number of times that a cell was cut: 22 parts of one were cut 0.94 times.
+  constexpr double kTimesCutRounding = 0.01;
   std::vector<Index> cells;
   for (std::size_t c = 0; c < sizes.size(); ++c) {
     const double times_cut = -std::log(sizes[c]) / std::log(3);
-    if (std::abs(times_cut - std::round(times_cut)) > kRounding) cells.push_back(static_cast<Index>(c));
+    if (std::abs(times_cut - std::round(times_cut)) > kTimesCutRounding) cells.push_back(static_cast<Index>(c));
   }
   return cells;
 }

@@ -54,7 +54,7 @@ struct FaceGradients {
 };
 
 FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
-  constexpr double kRounding = 1e-9;  // share of the face's radius up to which it is flat
+  constexpr double kFlatFaceRounding = 1e-9;  // share of the face's radius up to which it is flat
   // The volume below a fan around the mean of the corners, as `region_volumes` measures it.
   FaceGradients result;
   result.of_corner.fill(Vec3::Zero());
@@ -75,16 +75,16 @@ FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
     result.of_corner[i] += of_center / count;
     out_of_plane = std::max(out_of_plane, std::abs((x[face.corners[i]] - center).dot(result.area.normalized())));
   }
-  result.is_flat = out_of_plane <= kRounding * largest;
+  result.is_flat = out_of_plane <= kFlatFaceRounding * largest;
   return result;
 }
 
 /// Takes a direction out of those in which a vertex may move.
 void forbid(Mat3& projector, const Vec3& normal) {
   // Sine of 3 degrees: normals closer than that to those forbidden before are not independent of them.
-  constexpr double kIndependent = 0.05;
+  constexpr double kIndependentNormalSine = 0.05;
   const Vec3 left = projector * normal;
-  if (left.norm() < kIndependent) return;
+  if (left.norm() < kIndependentNormalSine) return;
   projector -= left * left.transpose() / left.squaredNorm();
 }
 
@@ -131,7 +131,7 @@ struct VertexGradients {
 /// Moves vertices so that the volumes grow by what is missing, to first order. Returns false if there is no such move.
 bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> faces, std::span<const Mat3> projectors,
                   VolumeMesh& mesh) {
-  constexpr double kMostMove = 0.2;  // of the root of the area around a vertex
+  constexpr double kMostVolumeMove = 0.2;  // of the root of the area around a vertex
   const auto [by_vertex, area] = VertexGradients(faces, mesh);
   std::vector<MatrixEntry> entries;
   for (std::size_t v = 0; v < by_vertex.size(); ++v)
@@ -144,7 +144,7 @@ bool move_towards(const Eigen::VectorXd& missing, std::span<const SheetFace> fac
     Vec3 move = Vec3::Zero();
     for (const auto& [r, g] : by_vertex[v]) move += factors[r] * g / area[v];
     move = projectors[v] * move;
-    const double most = kMostMove * std::sqrt(area[v]);
+    const double most = kMostVolumeMove * std::sqrt(area[v]);
     mesh.positions[v] += move.norm() > most ? Vec3(most / move.norm() * move) : move;
   }
   return true;
@@ -169,7 +169,7 @@ std::pair<double, Eigen::VectorXd> volume_errors(const VolumeMesh& mesh, std::sp
 template <class Nodes>
 bool restore_by_moves(VolumeMesh mesh, std::span<const double> wanted, double least_jacobian, int rounds,
                       const Nodes& nodes, std::vector<Vec3>& unknowns) {
-  constexpr double kEnough = 1e-6;  // relative
+  constexpr double kNegligibleVolumeError = 1e-6;  // relative
   const MeshTopology topology(mesh);
   const std::vector<SheetFace> faces = sheet_faces(mesh, topology);
   const std::vector<Vec3> before = unknowns;
@@ -183,7 +183,7 @@ bool restore_by_moves(VolumeMesh mesh, std::span<const double> wanted, double le
     least_error = error;
     best = unknowns;
     const std::vector<Vec3> start = mesh.positions;
-    if (error < kEnough || !move_towards(missing, faces, projectors, mesh)) break;
+    if (error < kNegligibleVolumeError || !move_towards(missing, faces, projectors, mesh)) break;
     for (std::size_t v = 0; v < unknowns.size(); ++v) unknowns[v] += mesh.positions[v] - start[v];
     mesh.positions = nodes(unknowns);
   }
@@ -200,15 +200,15 @@ bool restore_by_moves(VolumeMesh mesh, std::span<const double> wanted, double le
 }  // namespace
 
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kRounds = 6;  // of Newton's method
+  constexpr int kMeshVolumeRounds = 6;  // of Newton's method
   return restore_by_moves(
-      mesh, wanted, least_jacobian, kRounds, [](const std::vector<Vec3>& x) { return x; }, mesh.positions);
+      mesh, wanted, least_jacobian, kMeshVolumeRounds, [](const std::vector<Vec3>& x) { return x; }, mesh.positions);
 }
 
 bool restore_volumes(FittedCage& cage, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
+  constexpr int kCageVolumeRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
   return restore_by_moves(
-      cage.mesh(), wanted, least_jacobian, kRounds,
+      cage.mesh(), wanted, least_jacobian, kCageVolumeRounds,
       [&](const std::vector<Vec3>& x) { return cage.level().nodes.apply(x); }, cage.cage.positions);
 }
 

@@ -19,8 +19,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kFlat = 1e-7;        ///< distance from a plane or a line, as a share of the size
-constexpr double kSameNormal = 1e-5;  ///< sine of the angle between normals
+constexpr double kMostFlatDeviation = 1e-7;  ///< distance from a plane or a line, as a share of the size
+constexpr double kSameNormalSine = 1e-5;     ///< of the angle between normals
 
 /// The directions that a node may not move in: the sum of n n^T over unit vectors n.
 struct Barred {
@@ -37,7 +37,7 @@ struct Barred {
     Mat3 result = Mat3::Zero();
     for (int i = 0; i < 3; ++i) {
       const Vec3 direction = solver.eigenvectors().col(i);
-      if (solver.eigenvalues()[i] < kSameNormal * kSameNormal) result += direction * direction.transpose();
+      if (solver.eigenvalues()[i] < kSameNormalSine * kSameNormalSine) result += direction * direction.transpose();
     }
     return result;
   }
@@ -108,10 +108,10 @@ class SheetBars {
     const Vec3 chord = mesh_.coefficients[w] - mesh_.coefficients[v];
     const double length = chord.norm();
     Barred barred;
-    barred.all = !(length > 0) || std::ranges::any_of(modes(mesh_.space.edge_nodes(e), mesh_.space.edge_nodes(e + 1)),
-                                                      [&](const Vec3& mode) {
-                                                        return mode.cross(chord).norm() > kFlat * length * length;
-                                                      });
+    barred.all = !(length > 0) ||
+                 std::ranges::any_of(
+                     modes(mesh_.space.edge_nodes(e), mesh_.space.edge_nodes(e + 1)),
+                     [&](const Vec3& mode) { return mode.cross(chord).norm() > kMostFlatDeviation * length * length; });
     if (!barred.all) barred.sum = Mat3::Identity() - chord * chord.transpose() / (length * length);
     add(edges_[e], barred);
     add(vertices_[v], barred);
@@ -127,7 +127,9 @@ class SheetBars {
     const double size = std::sqrt(area.norm());
     if (!(size > 0)) return {};
     const Vec3 normal = area / area.norm();
-    const auto lies_in_plane = [&](const Vec3& offset) { return std::abs(normal.dot(offset)) <= kFlat * size; };
+    const auto lies_in_plane = [&](const Vec3& offset) {
+      return std::abs(normal.dot(offset)) <= kMostFlatDeviation * size;
+    };
     const auto all_lie = [&](std::size_t begin, std::size_t end) {
       return std::ranges::all_of(modes(begin, end), lies_in_plane);
     };

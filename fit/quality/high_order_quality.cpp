@@ -18,7 +18,7 @@
 namespace subvol::internal {
 namespace {
 
-constexpr std::size_t kChunk = 512;  // points per table, so that tables of high orders stay small
+constexpr std::size_t kPointsPerPatternTable = 512;  // so that tables of high orders stay small
 
 /// Summary of a cell's samples.
 struct SampledCell {
@@ -39,8 +39,8 @@ void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<co
   const Quadrature rule = make_quadrature(kind, QuadratureRule::trapezoidal, n);
   const std::vector<Vec3>& points = rule.points;
   const Mat3 inverse = ideal_inverse(kind);
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t size = std::min(kChunk, points.size() - begin);
+  for (std::size_t begin = 0; begin < points.size(); begin += kPointsPerPatternTable) {
+    const std::size_t size = std::min(kPointsPerPatternTable, points.size() - begin);
     const PatternTable table(mesh.space, pattern, std::span(points).subspan(begin, size),
                              PatternTable::Derivatives::first);
     const auto sample = [&](Index c, std::vector<Mat3>& jacobians) {

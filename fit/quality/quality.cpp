@@ -254,7 +254,7 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
   const auto hexes = [&](std::size_t first) {
     thread_local HexSampler<Lanes> sampler;
     const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n, of_hex);
-    for (int lane = 0; lane < kLanes; ++lane) keep(first + lane, s.least[lane], s.mean[lane]);
+    for (int lane = 0; lane < kSimdLanes; ++lane) keep(first + lane, s.least[lane], s.mean[lane]);
   };
   for_each_cell_block(mesh, hexes, [&](std::size_t c) {
     const auto corners = gather_cell(mesh.positions, mesh, c);

@@ -5,6 +5,6 @@ namespace subvol::internal {
 
 /// Number of cells or Jacobians that the kernels process at once: one SIMD register of doubles, or several narrower
 /// ones.
-inline constexpr int kLanes = 8;
+inline constexpr int kSimdLanes = 8;
 
 }  // namespace subvol::internal

@@ -6,7 +6,7 @@
 
 namespace subvol::internal {
 
-static_assert(kWide == kLanes);
+static_assert(kWide == kSimdLanes);
 
 /// The eight numbers of a vector, to be set one by one.
 inline double* lanes(Wide& w) { return reinterpret_cast<double*>(&w); }

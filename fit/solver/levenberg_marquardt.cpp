@@ -19,20 +19,21 @@ namespace {
 /// Range of mu, and of its product with a local factor: relative to the diagonal of the Hessian, 1e4 stops a degree of
 /// freedom, and 1e-4 has hardly any effect.
 constexpr double kLeastDamping = 1e-4, kMostDamping = 1e4;
-constexpr double kLess = 0.3, kMore = 6;  // factors on mu after a step that was taken at once, and one that was not
+/// Factors on mu after a step that was taken at once, and one that was not.
+constexpr double kDampingFall = 0.3, kDampingRise = 6;
 constexpr double kMostLocalDamping = 1e6;  // largest local factor, so that it can fall again within a few steps
-constexpr int kMostTrials = 8;             // of a step, each with a larger mu: kMore^8 = 1.7e6
+constexpr int kMostTrials = 8;             // of a step, each with a larger mu: kDampingRise^8 = 1.7e6
 
 /// Returns the cells whose energy rises most, as few as account for half of all rises.
 std::vector<Index> most_risen(std::span<const double> before, std::span<const double> after) {
-  constexpr double kShare = 0.5;
+  constexpr double kMostRisenShare = 0.5;
   std::vector<Index> cells;
   const auto rise = [&](Index c) { return after[c] - before[c]; };
   double rest = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
     const auto c = static_cast<Index>(i);
     if (!(rise(c) > 0)) continue;
-    rest += kShare * rise(c);
+    rest += kMostRisenShare * rise(c);
     cells.push_back(c);
   }
   std::ranges::stable_sort(cells, std::greater{}, rise);
@@ -79,14 +80,15 @@ LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Ve
 
 void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> diagonal) {
   // Share of the mean of the diagonal. A degree of freedom without energy must not make the matrix singular.
-  constexpr double kRounding = 1e-12;
+  constexpr double kLeastHessianDiagonal = 1e-12;
   std::vector<double> added(diagonal.size());
   double mean = 0;
   for (std::size_t j = 0; j < diagonal.size(); ++j) mean += added[j] = diagonal[j].trace() / 3;
   mean /= static_cast<double>(std::max<std::size_t>(diagonal.size(), 1));
   std::vector<Mat3> damped(diagonal.begin(), diagonal.end());
   for (std::size_t j = 0; j < added.size(); ++j) {
-    added[j] = std::min(kMostDamping, damping_ * local_damping_[j]) * 0.5 * (added[j] + mean) + kRounding * mean;
+    added[j] =
+        std::min(kMostDamping, damping_ * local_damping_[j]) * 0.5 * (added[j] + mean) + kLeastHessianDiagonal * mean;
     damped[j].diagonal().array() += added[j];
   }
   inverse_diagonal_ = inverse_blocks(damped);
@@ -112,21 +114,22 @@ void LevenbergMarquardtRun::shorten_at(std::span<const Index> cells, double fact
 void LevenbergMarquardtRun::damp_where_shortened() {
   for (std::size_t j = 0; j < local_damping_.size(); ++j) {
     double& local = local_damping_[j];
-    local = shortened_[j] != 0 ? std::min(kMostLocalDamping, kMore * local) : std::max(1.0, kLess * local);
+    local =
+        shortened_[j] != 0 ? std::min(kMostLocalDamping, kDampingRise * local) : std::max(1.0, kDampingFall * local);
   }
 }
 
 bool LevenbergMarquardtRun::shorten_where_harmful() {
   // The steps of ruined cells are halved, and are 0 in the last passes. The same number of passes stops cells that lose
   // their certificate.
-  constexpr int kHalvings = 10, kStops = 4;
-  for (int pass = 0; pass < kHalvings + kStops; ++pass) {
+  constexpr int kStepHalvingPasses = 10, kStepStopPasses = 4;
+  for (int pass = 0; pass < kStepHalvingPasses + kStepStopPasses; ++pass) {
     const std::vector<Index> ruined = problem_.volume->ruined(y_, y_trial_);
     if (ruined.empty()) break;
-    shorten_at(ruined, pass < kHalvings ? 0.5 : 0);
+    shorten_at(ruined, pass < kStepHalvingPasses ? 0.5 : 0);
     try_nodes();
   }
-  for (int pass = 0; pass < kStops; ++pass) {
+  for (int pass = 0; pass < kStepStopPasses; ++pass) {
     trial_uncertified_ = problem_.volume->uncertified(y_trial_);
     const std::vector<Index> failed = newly_failed(uncertified_, trial_uncertified_);
     if (failed.empty()) return true;
@@ -178,7 +181,7 @@ bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
     ++record.evaluations;
     if (shorten_until_downhill()) return true;
     if (result_.stop == MinimizerStop::cancelled) return false;
-    damping_ = std::min(kMostDamping, kMore * damping_);
+    damping_ = std::min(kMostDamping, kDampingRise * damping_);
   }
   return false;
 }
@@ -206,7 +209,7 @@ MinimizerResult LevenbergMarquardtRun::run() {
       if (result_.stop == MinimizerStop::cancelled) return std::move(result_);
       return end(MinimizerStop::no_step, "no step decreases the energy");
     }
-    if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kLess * damping_);
+    if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kDampingFall * damping_);
     damp_where_shortened();
     if (!take_accelerated_step(1, record)) take_step(1, record);
     if (is_done(record)) return std::move(result_);
@@ -224,8 +227,8 @@ MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Ve
 double damping_after(double first, std::span<const IterationRecord> steps) {
   double damping = first;
   for (const IterationRecord& step : steps) {
-    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kMore * damping);
-    if (step.evaluations == 1) damping = std::max(kLeastDamping, kLess * damping);
+    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kDampingRise * damping);
+    if (step.evaluations == 1) damping = std::max(kLeastDamping, kDampingFall * damping);
   }
   return damping;
 }

@@ -16,7 +16,7 @@ constexpr double kShortStep = 0.5;
 /// Steps after which everything but x is forgotten, so that an interrupted minimization can be resumed from x.
 constexpr int kRestartPeriod = 8;
 /// Slopes below this are rounding; dimensionless, like E.
-constexpr double kLevel = 1e-26;
+constexpr double kSlopeRounding = 1e-26;
 
 /// One minimization by Newton's method.
 class NewtonRun : MinimizerRun {
@@ -60,7 +60,7 @@ bool NewtonRun::find_direction(IterationRecord& record) {
   if (inverse_diagonal_.empty()) inverse_diagonal_ = inverse_blocks(reduced.diagonal(), problem_.projectors);
   record.linear_iterations += conjugate_gradients(reduced, inverse_diagonal_, linearized_.gradient(), options_, d_);
   slope_ = dot(linearized_.gradient(), d_);
-  return slope_ < -kLevel;
+  return slope_ < -kSlopeRounding;
 }
 
 bool NewtonRun::has_no_gradient() const {
@@ -69,7 +69,7 @@ bool NewtonRun::has_no_gradient() const {
     const Vec3& g = linearized_.gradient()[j];
     decrease += inverse_diagonal_[j].isZero(0) ? g.squaredNorm() : g.dot(inverse_diagonal_[j] * g);
   }
-  return decrease <= kLevel;
+  return decrease <= kSlopeRounding;
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {

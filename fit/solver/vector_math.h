@@ -11,12 +11,13 @@ namespace subvol::internal {
 
 /// sum_i a_i . b_i over arrays of points of equal size. Fixed slices, summed in order: same bits for any thread count.
 inline double dot(std::span<const Vec3> a, std::span<const Vec3> b) {
-  constexpr std::size_t kSlices = 64;  // more than any machine's threads that help at this
-  std::array<double, kSlices> sums{};
+  constexpr std::size_t kDotProductSlices = 64;  // more than any machine's threads that help at this
+  std::array<double, kDotProductSlices> sums{};
 #pragma omp parallel for schedule(static)
-  for (std::size_t s = 0; s < kSlices; ++s) {
+  for (std::size_t s = 0; s < kDotProductSlices; ++s) {
     double sum = 0;
-    for (std::size_t i = a.size() * s / kSlices; i < a.size() * (s + 1) / kSlices; ++i) sum += a[i].dot(b[i]);
+    for (std::size_t i = a.size() * s / kDotProductSlices; i < a.size() * (s + 1) / kDotProductSlices; ++i)
+      sum += a[i].dot(b[i]);
     sums[s] = sum;
   }
   double total = 0;

@@ -18,7 +18,7 @@ namespace subvol::internal {
 namespace {
 
 /// The threshold of the hinge lies this far above the goal: a squared hinge is not zero where it balances the surface.
-constexpr double kMargin = 0.15;
+constexpr double kHingeMargin = 0.15;
 /// A coarse mesh needs no more than this below the goal: refining raises the mean, and the lift of the fine mesh the
 /// least.
 constexpr double kCoarseMargin = 0.05;
@@ -35,7 +35,7 @@ constexpr std::array<double, 4> kPatchShares{1, 0.85, 0.6, 0.3};
 /// Exponent of the norm of all costs of a state (`LiftMerit`).
 constexpr double kCostExponent = 4;
 
-double above(double goal, double margin = kMargin) { return std::min(0.95, goal + margin); }
+double above(double goal, double margin = kHingeMargin) { return std::min(0.95, goal + margin); }
 
 }  // namespace
 
@@ -224,7 +224,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
 /// triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
 double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
   // Factors on the emphasis of a triangle that is too far, or near enough, and the largest emphasis.
-  constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
+  constexpr double kFarEmphasisRaise = 3, kFarEmphasisFall = 0.97, kMostFarEmphasis = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
   if (!patch_mesh_) surface_->forget();  // the fit may be resumed from here, but not within a patch
@@ -235,8 +235,8 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
   double costs = 0;
   for (std::size_t t = 0; t < shares.size(); ++t) {
     double& emphasis = far_emphasis_[t];
-    emphasis =
-        shares[t] > schedule.far_margin ? std::min(kMost, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
+    emphasis = shares[t] > schedule.far_margin ? std::min(kMostFarEmphasis, kFarEmphasisRaise * emphasis)
+                                               : std::max(1.0, kFarEmphasisFall * emphasis);
     factors[t] *= emphasis;
     costs += std::pow(schedule.merit.cost_of_place(shares[t] - 1), kCostExponent);
     if (shares[t] > 1 && !triangle_cells_.empty()) state.far_cells.push_back(triangle_cells_[t]);
@@ -335,8 +335,8 @@ bool QualityStages::relax(std::span<const Index> centers, int rings, const Quali
 /// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kSteps = 2, kPatience = 5;  // of a round; rounds without a better state
-  constexpr double kWorthwhile = 0.7;  // a round of the whole mesh must leave less than this share of the poor cells
+  constexpr int kLiftRoundSteps = 2, kLiftPatience = 5;  // of a round; rounds without a better state
+  constexpr double kMostPoorShareLeft = 0.7;             // a round of the whole mesh must leave fewer of the poor cells
   const bool is_patch = patch_mesh_ != nullptr;
   // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:
   // joint129 at level 2 rises to 0.21 by such patches, but to 0.65 if the whole mesh is lifted as long as that helps.
@@ -353,7 +353,7 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
     std::vector<QualityPatch> patches;
     if (is_patch) return patches;
     const std::size_t poor = now.cells.poor.size(), before = std::exchange(poor_before, poor);
-    const bool gains = static_cast<double>(poor) < kWorthwhile * static_cast<double>(before);
+    const bool gains = static_cast<double>(poor) < kMostPoorShareLeft * static_cast<double>(before);
     for (; patches.empty() && pass < kPatchRings.size(); ++pass)
       for (std::size_t i = 0; patches.empty() && i < kPatchShares.size(); ++i) {
         if (i > 0 && (is_whole_cage || (pass == 0 && gains))) return patches;
@@ -361,14 +361,14 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
       }
     return patches;
   };
-  for (int done = 0;; done += kSteps) {
+  for (int done = 0;; done += kLiftRoundSteps) {
     State now = inspect(schedule, x);
     if (now.merit > state_.merit) {
       state_ = now;
       best = x;
       since_best = 0;
     }
-    if (!going || now.merit >= 1 || ++since_best > kPatience || done >= schedule.lift.steps) break;
+    if (!going || now.merit >= 1 || ++since_best > kLiftPatience || done >= schedule.lift.steps) break;
     if (const std::vector<QualityPatch> patches = next_patches(now); !patches.empty()) {
       QualitySchedule of_patch = schedule;
       of_patch.stages.clear();
@@ -378,9 +378,9 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
     }
     if (pass > 0) break;
     QualityStage stage = schedule.lift;
-    stage.steps = kSteps;
+    stage.steps = kLiftRoundSteps;
     going = run_stage(stage,
-                      formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kSteps + 1,
+                      formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kLiftRoundSteps + 1,
                                 now.cells.poor.size(), schedule.goal),
                       true, x);
   }

@@ -22,7 +22,7 @@ constexpr double kStuck = 0.1;
 constexpr double kWeightGrowth = 1.5;
 /// A round ends after so many steps, or when two steps in a row decrease the energy by a smaller share than this:
 /// the next epsilon changes it anyway.
-constexpr int kSteps = 5;
+constexpr int kUntanglingRoundSteps = 5;
 constexpr double kRelativeDecrease = 1e-2;
 /// Relative rise of the worst determinant that counts as a gain even if no fewer cells fail.
 constexpr double kLeastRise = 0.01;
@@ -95,7 +95,7 @@ UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const Untang
     StageRecord stage = record;
     stage.name = record.name + formatted(", epsilon %.3g", epsilon);
     const double before = cells.energy(x);
-    const Stage weights{problem.lambda, options.tangential_weight, kSteps, kRelativeDecrease};
+    const Stage weights{problem.lambda, options.tangential_weight, kUntanglingRoundSteps, kRelativeDecrease};
     const bool going = runner.run(problem, weights, std::move(stage), x, report);
     const double decrease = 1 - cells.energy(x) / before;
     if (cells.look(x) || !going) return {going, cells.uncertified()};

@@ -82,8 +82,10 @@ TEST_CASE("The check of the numbers in the docs reports what is wrong", "[docs]"
   CHECK(wrong_rows("| right | 1/16, 0.001 | `kLeastDefaultLambdaShare`, `kLeastLambdaShare` " + file, count) ==
         Strings{});
   CHECK(count == 2);
-  CHECK(wrong_rows("| value | 0.02 | `kLeastGain` " + file, count) == Strings{"value: kLeastGain"});
+  CHECK(wrong_rows("| value | 0.02 | `kLeastLambdaHalvingGain` " + file, count) ==
+        Strings{"value: kLeastLambdaHalvingGain"});
   CHECK(wrong_rows("| name | 0.01 | `kLeastLoss` " + file, count) == Strings{"name: kLeastLoss"});
-  CHECK(wrong_rows("| number | 0.01 | `kLeastGain`, `kMostUnfoldingLambda` " + file, count).size() == 2);
-  CHECK(wrong_rows("| file | 0.01 | `kLeastGain` | `fit/none.h` |\n", count) == Strings{"file: kLeastGain"});
+  CHECK(wrong_rows("| number | 0.01 | `kLeastLambdaHalvingGain`, `kMostUnfoldingLambda` " + file, count).size() == 2);
+  CHECK(wrong_rows("| file | 0.01 | `kLeastLambdaHalvingGain` | `fit/none.h` |\n", count) ==
+        Strings{"file: kLeastLambdaHalvingGain"});
 }

@@ -49,12 +49,12 @@ DistortionBatch evaluated(Distortion distortion, const Mat3& j, double floor = k
   DistortionBatch batch;
   batch.floor = floor;
   for (int e = 0; e < 9; ++e)
-    for (int l = 0; l < kLanes; ++l) batch.jacobian[e][l] = j(e / 3, e % 3);
+    for (int l = 0; l < kSimdLanes; ++l) batch.jacobian[e][l] = j(e / 3, e % 3);
   kernels_of(distortion).hessian(&batch, 1);
   return batch;
 }
 
-Mat3 matrix(const double (*entries)[kLanes]) {
+Mat3 matrix(const double (*entries)[kSimdLanes]) {
   Mat3 m;
   for (int e = 0; e < 9; ++e) m(e / 3, e % 3) = entries[e][0];
   return m;
@@ -206,11 +206,11 @@ TEST_CASE("Batches of Jacobians worked on side by side give what they give alone
     for (const DistortionBatch& batch : alone) {
       DistortionBatch& copy = together.emplace_back();
       copy.floor = batch.floor;
-      std::copy_n(&batch.jacobian[0][0], 9 * kLanes, &copy.jacobian[0][0]);
+      std::copy_n(&batch.jacobian[0][0], 9 * kSimdLanes, &copy.jacobian[0][0]);
     }
     kernels_of(distortion).hessian(together.data(), static_cast<int>(together.size()));
     for (std::size_t n = 0; n < alone.size(); ++n) {
-      CHECK(together[n].energy[kLanes - 1] == Approx(alone[n].energy[0]).margin(1e-14));
+      CHECK(together[n].energy[kSimdLanes - 1] == Approx(alone[n].energy[0]).margin(1e-14));
       CHECK((matrix(together[n].stress) - matrix(alone[n].stress)).norm() <=
             1e-13 * (1 + matrix(alone[n].stress).norm()));
     }

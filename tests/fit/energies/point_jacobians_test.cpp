@@ -25,7 +25,7 @@ TEST_CASE("Scaled Jacobians at the points of a rule are those of the columns the
         std::vector<Vec3> corners = random.points(static_cast<std::size_t>(cell_topology(kind).num_vertices));
         if (trial == 0) std::fill(corners.begin(), corners.end(), corners[0]);  // all lengths vanish
         if (trial == 1) corners[1] = corners[0];
-        std::array<double, PointJacobians::kMostValues> values;
+        std::array<double, PointJacobians::kMostPointJacobians> values;
         jacobians.evaluate(corners.data(), kLeastLength, values.data());
         double least = 2;
         for (std::size_t q = 0; q < rule.num_points(); ++q) {

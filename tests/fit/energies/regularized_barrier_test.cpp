@@ -25,7 +25,7 @@ struct Value {
 Value barrier(const Mat3& jacobian, double epsilon) {
   RegularizedBatch batch;
   for (int k = 0; k < 9; ++k)
-    for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
+    for (int l = 0; l < kSimdLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
   regularized_barrier(batch, epsilon);
   Value value{batch.energy[0], {}, {}, batch.alpha[0], batch.beta[0], batch.gamma[0]};
   for (int k = 0; k < 9; ++k) {
@@ -154,9 +154,9 @@ TEST_CASE("In the form of other distortions, the regularized barrier has the sam
     const Value value = barrier(j, epsilon);
     DistortionBatch batch;
     for (int k = 0; k < 9; ++k)
-      for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = j(k / 3, k % 3);
+      for (int l = 0; l < kSimdLanes; ++l) batch.jacobian[k][l] = j(k / 3, k % 3);
     regularized_hessian(&batch, 1, epsilon);
-    const auto matrix_of = [&](const double(*entries)[kLanes]) {
+    const auto matrix_of = [&](const double(*entries)[kSimdLanes]) {
       Mat3 m;
       for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = entries[k][3];
       return m;
