@@ -77,7 +77,7 @@ class VolumeEnergy final : public RegularizedTerm {
     /// kSimdLanes lanes; empty: ideal cells.
     std::vector<double> to_reference;
     const double (*reference(std::size_t batch, std::size_t q) const)[kSimdLanes] {
-      return reinterpret_cast<const double(*)[kSimdLanes]>(to_reference.data() +
+      return reinterpret_cast<const double (*)[kSimdLanes]>(to_reference.data() +
                                                            9 * kSimdLanes * (batch * rule.num_points() + q));
     }
   };
