@@ -41,12 +41,13 @@ int main() {
           best_us_per_cell(mesh.num_cells(), 15, [&] { positive_bernstein(mesh.positions, mesh, positive); });
       CertificateSummary summary;
       const double full = best_us_per_cell(mesh.num_cells(), 15, [&] { summary = certify(mesh); });
-      std::printf("%s\n  {\"cells\": %zu, \"amplitude\": %g, \"threads\": %d, \"coefficients_us_per_cell\": %.4f, "
-                  "\"certify_us_per_cell\": %.4f, \"coefficients_alone\": %zu, \"certified\": %zu, \"invalid\": %zu, "
-                  "\"undecided\": %zu}",
-                  separator, mesh.num_cells(), amplitude, threads, plain, full,
-                  static_cast<std::size_t>(std::count(positive.begin(), positive.end(), 1)), summary.certified,
-                  summary.invalid, summary.undecided);
+      std::printf(
+          "%s\n  {\"cells\": %zu, \"amplitude\": %g, \"threads\": %d, \"coefficients_us_per_cell\": %.4f, "
+          "\"certify_us_per_cell\": %.4f, \"coefficients_alone\": %zu, \"certified\": %zu, \"invalid\": %zu, "
+          "\"undecided\": %zu}",
+          separator, mesh.num_cells(), amplitude, threads, plain, full,
+          static_cast<std::size_t>(std::count(positive.begin(), positive.end(), 1)), summary.certified, summary.invalid,
+          summary.undecided);
       separator = ",";
     }
   }

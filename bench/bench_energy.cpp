@@ -3,9 +3,9 @@
 // the same energy evaluated one Jacobian at a time with a general eigenvalue solver. JSON to stdout.
 #include "subvol/fit/energies/volume_energy.h"
 
+#include <omp.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <omp.h>
 
 #include <algorithm>
 #include <chrono>
@@ -25,8 +25,7 @@ VolumeMesh shaken(CellKind kind, int n) {
   std::uniform_real_distribution<double> shift(-0.1, 0.1);
   for (int k = 0; k <= n; ++k)
     for (int j = 0; j <= n; ++j)
-      for (int i = 0; i <= n; ++i)
-        mesh.positions.emplace_back(i + shift(engine), j + shift(engine), k + shift(engine));
+      for (int i = 0; i <= n; ++i) mesh.positions.emplace_back(i + shift(engine), j + shift(engine), k + shift(engine));
   const auto add = [&mesh](CellKind cell, std::initializer_list<Index> v) {
     mesh.add_cell(cell, {v.begin(), v.size()});
   };

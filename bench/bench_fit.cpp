@@ -55,14 +55,14 @@ int main(int argc, char** argv) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (reference == 0) reference = seconds;
     const TriangleMesh boundary = refined_triangles(boundary_surface(result.mesh, MeshTopology(result.mesh)));
-    const double mean =
-        100 * surface_distance(boundary, sample.target).mean() / bounding_box_diagonal(sample.target);
+    const double mean = 100 * surface_distance(boundary, sample.target).mean() / bounding_box_diagonal(sample.target);
     const auto& last = result.report.stages.back().iterations;
-    std::printf("%s\n {\"variant\": \"%s\", \"seconds\": %.3f, \"ratio_to_default\": %.2f, \"mean_percent\": %.4f, "
-                "\"surface_energy\": %.6g, \"volume_energy\": %.6g, \"stop\": \"%s\"}",
-                &variant == variants ? "" : ",", variant.name, seconds, seconds / reference, mean,
-                last.empty() ? 0.0 : last.back().surface_energy, last.empty() ? 0.0 : last.back().volume_energy,
-                to_string(result.report.stop_reason));
+    std::printf(
+        "%s\n {\"variant\": \"%s\", \"seconds\": %.3f, \"ratio_to_default\": %.2f, \"mean_percent\": %.4f, "
+        "\"surface_energy\": %.6g, \"volume_energy\": %.6g, \"stop\": \"%s\"}",
+        &variant == variants ? "" : ",", variant.name, seconds, seconds / reference, mean,
+        last.empty() ? 0.0 : last.back().surface_energy, last.empty() ? 0.0 : last.back().volume_energy,
+        to_string(result.report.stop_reason));
     std::fflush(stdout);
   }
   std::printf("\n]}\n");

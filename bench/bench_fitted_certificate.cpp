@@ -47,8 +47,10 @@ void measure(const char* path, bool last) {
       }
     });
     total += time;
-    if (pass == 0) first = time;
-    else later = std::min(later, time);
+    if (pass == 0)
+      first = time;
+    else
+      later = std::min(later, time);
   }
   std::vector<int> points(num_cells);
   for (std::size_t c = 0; c < num_cells; ++c)
@@ -63,11 +65,11 @@ void measure(const char* path, bool last) {
     gradient_time = std::min(gradient_time, time);
   }
   const double cells = static_cast<double>(num_cells);
-  std::printf(" {\"mesh\": \"%s\", \"cells\": %zu, \"order\": %d, \"energy_and_gradient_us\": %.2f, "
-              "\"proof_first\": %.2f, \"proof_later\": %.2f, \"boxes_per_cell\": %.1f, \"not_valid\": %zu}%s\n",
-              std::filesystem::path(path).stem().string().c_str(), num_cells, mesh.space.max_order(),
-              gradient_time / cells, first / gradient_time, later / gradient_time, static_cast<double>(boxes) / cells,
-              not_valid, last ? "" : ",");
+  std::printf(
+      " {\"mesh\": \"%s\", \"cells\": %zu, \"order\": %d, \"energy_and_gradient_us\": %.2f, "
+      "\"proof_first\": %.2f, \"proof_later\": %.2f, \"boxes_per_cell\": %.1f, \"not_valid\": %zu}%s\n",
+      std::filesystem::path(path).stem().string().c_str(), num_cells, mesh.space.max_order(), gradient_time / cells,
+      first / gradient_time, later / gradient_time, static_cast<double>(boxes) / cells, not_valid, last ? "" : ",");
 }
 
 }  // namespace

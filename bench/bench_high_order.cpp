@@ -79,14 +79,14 @@ void print_energy(const ElementSpace& space, const std::vector<Vec3>& nodes, int
   const double multiply = best_microseconds(5, [&] { energy.multiply(gradient, product); });
   const double both_cpu = best_cpu_microseconds(5, [&] { energy.add_gradient(nodes, 1, gradient); });
   gradient_us_per_cell = both_cpu / static_cast<double>(space.num_cells());
-  std::printf("%s\n  {\"kind\": \"%s\", \"basis\": \"%s\", \"order\": %d, \"points_per_cell\": %.0f, "
-              "\"value_ns_per_point\": %.1f, \"gradient_ns_per_point\": %.1f, \"second_derivative_ns_per_point\": "
-              "%.1f, \"product_ns_per_point\": %.1f, \"gradient_us_per_cell\": %.1f, "
-              "\"gradient_gain_of_two_threads\": %.2f",
-              separator, cell_topology(space.kind(0)).name, to_string(space.basis()), order,
-              num_points / static_cast<double>(space.num_cells()), 1e3 * value / num_points, 1e3 * both / num_points,
-              1e3 * second / num_points, 1e3 * multiply / num_points, gradient_us_per_cell,
-              both / both_by_two);
+  std::printf(
+      "%s\n  {\"kind\": \"%s\", \"basis\": \"%s\", \"order\": %d, \"points_per_cell\": %.0f, "
+      "\"value_ns_per_point\": %.1f, \"gradient_ns_per_point\": %.1f, \"second_derivative_ns_per_point\": "
+      "%.1f, \"product_ns_per_point\": %.1f, \"gradient_us_per_cell\": %.1f, "
+      "\"gradient_gain_of_two_threads\": %.2f",
+      separator, cell_topology(space.kind(0)).name, to_string(space.basis()), order,
+      num_points / static_cast<double>(space.num_cells()), 1e3 * value / num_points, 1e3 * both / num_points,
+      1e3 * second / num_points, 1e3 * multiply / num_points, gradient_us_per_cell, both / both_by_two);
 }
 
 /// Shares of a cell's edge by which modes are random.
@@ -103,12 +103,13 @@ void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double
     const double time = best_cpu_microseconds(first * cells > kMostRepeatedMicroseconds ? 1 : 5,
                                               [&] { summary = certify(space, nodes); }) /
                         cells;
-    std::printf(", \"certify_%g_us_per_cell\": %.2f, \"certify_%g_to_gradient\": %.2f, "
-                "\"first_%g_us_per_cell\": %.2f, \"first_%g_to_gradient\": %.2f, \"valid_%g\": %zu, "
-                "\"invalid_%g\": %zu, \"undecided_%g\": %zu",
-                amplitude, time, amplitude, time / gradient_us_per_cell, amplitude, first, amplitude,
-                first / gradient_us_per_cell, amplitude, summary.certified, amplitude, summary.invalid, amplitude,
-                summary.undecided);
+    std::printf(
+        ", \"certify_%g_us_per_cell\": %.2f, \"certify_%g_to_gradient\": %.2f, "
+        "\"first_%g_us_per_cell\": %.2f, \"first_%g_to_gradient\": %.2f, \"valid_%g\": %zu, "
+        "\"invalid_%g\": %zu, \"undecided_%g\": %zu",
+        amplitude, time, amplitude, time / gradient_us_per_cell, amplitude, first, amplitude,
+        first / gradient_us_per_cell, amplitude, summary.certified, amplitude, summary.invalid, amplitude,
+        summary.undecided);
   }
 }
 

@@ -42,11 +42,11 @@ int main() {
       const OptimizeResult result = optimize_mesh(mesh, nullptr, {.fixed_boundary = fixed});
       const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
       const QualityReport after = measure_quality(result.mesh);
-      std::printf("%s{\"hexes\": %zu, \"boundary\": \"%s\", \"inverted_before\": %zu, \"not_certified\": %zu, "
-                  "\"min_scaled_jacobian\": %.4f, \"ms_per_hex\": %.4f}",
-                  separator, mesh.num_cells(), fixed ? "fixed" : "sliding", before.inverted_cells,
-                  result.uncertified.size(), after.min_scaled_jacobian,
-                  time.count() / static_cast<double>(mesh.num_cells()));
+      std::printf(
+          "%s{\"hexes\": %zu, \"boundary\": \"%s\", \"inverted_before\": %zu, \"not_certified\": %zu, "
+          "\"min_scaled_jacobian\": %.4f, \"ms_per_hex\": %.4f}",
+          separator, mesh.num_cells(), fixed ? "fixed" : "sliding", before.inverted_cells, result.uncertified.size(),
+          after.min_scaled_jacobian, time.count() / static_cast<double>(mesh.num_cells()));
       separator = ", ";
     }
   std::printf("]}\n");

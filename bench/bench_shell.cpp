@@ -31,13 +31,15 @@ int main() {
     const auto start = std::chrono::steady_clock::now();
     const ShellResult shell = make_shell(surface, {.thickness = 0.05, .side = ShellSide::both, .layers = 2});
     const double total = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    std::printf("%s\n  {\"faces\": %zu, \"cells\": %zu, \"valid\": %s, \"seconds\": %.3f, \"cells_per_second\": %.0f, "
-                "\"start_share\": %.3f, \"solve_share\": %.3f, \"check_share\": %.3f}",
-                separator, surface.num_faces(), shell.mesh.num_cells(), shell.failures.none() ? "true" : "false", total,
-                static_cast<double>(shell.mesh.num_cells()) / total,
-                (seconds_of(shell.report, "directions") + seconds_of(shell.report, "thickness") +
-                 seconds_of(shell.report, "start")) / total,
-                seconds_of(shell.report, "solve") / total, seconds_of(shell.report, "check") / total);
+    std::printf(
+        "%s\n  {\"faces\": %zu, \"cells\": %zu, \"valid\": %s, \"seconds\": %.3f, \"cells_per_second\": %.0f, "
+        "\"start_share\": %.3f, \"solve_share\": %.3f, \"check_share\": %.3f}",
+        separator, surface.num_faces(), shell.mesh.num_cells(), shell.failures.none() ? "true" : "false", total,
+        static_cast<double>(shell.mesh.num_cells()) / total,
+        (seconds_of(shell.report, "directions") + seconds_of(shell.report, "thickness") +
+         seconds_of(shell.report, "start")) /
+            total,
+        seconds_of(shell.report, "solve") / total, seconds_of(shell.report, "check") / total);
     separator = ",";
   }
   std::printf("\n]}\n");

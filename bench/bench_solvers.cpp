@@ -103,10 +103,11 @@ int main(int argc, char** argv) {
   std::printf("{\"bench\": \"solvers\", \"order\": %d, \"unknowns\": %zu, \"rows\": [", order,
               mesh.coefficients.size());
   const auto print = [&](const char* name, const Run& run) {
-    std::printf("\n {\"solver\": \"%s\", \"steps\": %zu, \"least_energy\": %.6g, \"cpu_seconds\": %.3f, "
-                "\"seconds_to_1_percent\": %.3f, \"ratio_to_newton\": %.2f}",
-                name, run.energies.size(), run.least(), run.seconds.back(), run.seconds_to(near),
-                run.seconds_to(near) / newton.seconds_to(near));
+    std::printf(
+        "\n {\"solver\": \"%s\", \"steps\": %zu, \"least_energy\": %.6g, \"cpu_seconds\": %.3f, "
+        "\"seconds_to_1_percent\": %.3f, \"ratio_to_newton\": %.2f}",
+        name, run.energies.size(), run.least(), run.seconds.back(), run.seconds_to(near),
+        run.seconds_to(near) / newton.seconds_to(near));
   };
   print("newton", newton);
   std::printf(",");

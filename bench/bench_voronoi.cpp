@@ -5,8 +5,8 @@
 #include "subvol/fit/geometry/restricted_voronoi.h"
 #include "subvol/surface/triangle_mesh.h"
 
-#include <Eigen/Geometry>
 #include <omp.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

@@ -37,7 +37,7 @@ inline VolumeMesh cells_of(CellKind kind, int n, double shake = 0) {
   if (kind == CellKind::hex) return hexes;
   static constexpr int kPrisms[2][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}};
   static constexpr int kTets[6][4] = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6},
-                                       {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
+                                      {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
   VolumeMesh mesh;
   mesh.positions = hexes.positions;
   const auto add = [&](std::span<const Index> hex, std::span<const int> corners) {

@@ -28,14 +28,10 @@ constexpr int kGmshQuads[] = {3, 10, 36, 37, 38, 47, 48, 49, 50, 51};
 
 std::span<const int> gmsh_types(CellKind kind) {
   switch (kind) {
-    case CellKind::tet:
-      return kGmshTets;
-    case CellKind::prism:
-      return kGmshPrisms;
-    case CellKind::pyramid:
-      return kGmshPyramids;
-    case CellKind::hex:
-      break;
+    case CellKind::tet: return kGmshTets;
+    case CellKind::prism: return kGmshPrisms;
+    case CellKind::pyramid: return kGmshPyramids;
+    case CellKind::hex: break;
   }
   return kGmshHexes;
 }
@@ -385,9 +381,8 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   std::string text = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"") +
                      (is_linear ? "1.0" : "2.2") +
                      "\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  <UnstructuredGrid>\n";
-  text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) +
-          "\" NumberOfCells=\"" + std::to_string(mesh.num_cells()) +
-          "\">\n      <Points>\n";
+  text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) + "\" NumberOfCells=\"" +
+          std::to_string(mesh.num_cells()) + "\">\n      <Points>\n";
   append_data_array(text, "Name=\"Points\" NumberOfComponents=\"3\"", coordinates);
   text += "      </Points>\n      <Cells>\n";
   append_data_array<std::int64_t>(text, "Name=\"connectivity\"", corners);
@@ -395,8 +390,7 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   append_data_array<std::uint8_t>(text, "Name=\"types\"", types);
   text += "      </Cells>\n";
   if (!fields.empty()) text += "      <PointData>\n";
-  for (const VertexField& field : fields)
-    append_data_array<double>(text, "Name=\"" + field.name + "\"", field.values);
+  for (const VertexField& field : fields) append_data_array<double>(text, "Name=\"" + field.name + "\"", field.values);
   if (!fields.empty()) text += "      </PointData>\n";
   // MFEM takes the attributes of cells from the first array, if it is called material.
   text += references.empty() ? "      <CellData>\n" : "      <CellData Scalars=\"material\">\n";
@@ -415,8 +409,8 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   return text + "</VTKFile>\n";
 }
 
-std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
-                         std::span<const VertexField> fields, MshVersion version) {
+std::string msh_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
+                         MshVersion version) {
   const Blocks blocks = blocks_of(mesh);
   const std::map<Volume, int> volumes = volume_numbers(blocks);
   const FaceBlocks face_blocks = face_blocks_of(mesh);

@@ -17,10 +17,10 @@ namespace subvol::internal {
 struct CellView {
   std::span<const Vec3> positions;
   std::span<const CellKind> kinds;
-  std::span<const int> orders;      ///< one per cell, or empty: all 1
+  std::span<const int> orders;  ///< one per cell, or empty: all 1
   std::span<const std::size_t> offsets;
   std::span<const Index> nodes;
-  std::span<const int> references;  ///< one per cell, or empty: all 0
+  std::span<const int> references;      ///< one per cell, or empty: all 0
   const GroupedFaces* faces = nullptr;  ///< for a .msh; may be null
   std::span<const Group> regions{};     ///< names of references, for a .msh
   bool has_control_points = false;      ///< the nodes of cells with orders are control points, for a .vtu
@@ -51,8 +51,8 @@ std::uint8_t vtk_linear_type(CellKind kind);
 /// Renumbers the six corners of a prism to VTK's plain wedge, or back: the normal of its first triangle points outward.
 void turn_wedge(std::int64_t* corners);
 /// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted). Grouped faces are elements of surfaces, behind the cells.
-std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
-                         std::span<const VertexField> fields, MshVersion version = MshVersion::v4_1);
+std::string msh_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
+                         MshVersion version = MshVersion::v4_1);
 
 /// Returns a name as a .msh holds it: on one line, without quotes, and at most 126 bytes, which is what Gmsh reads.
 std::string gmsh_name(std::string name);

@@ -143,8 +143,8 @@ Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
   for (const char* name : {"surface", "cut"}) {
     const SeenFaces& faces = seen[sheets.size()];
     if (faces.faces.empty()) continue;
-    const BoundarySamples samples = make_face_samples(mesh.space, faces.faces, intervals_of(mesh.space),
-                                                      new_edges(topology, faces.faces, drawn));
+    const BoundarySamples samples =
+        make_face_samples(mesh.space, faces.faces, intervals_of(mesh.space), new_edges(topology, faces.faces, drawn));
     const bool is_cut = !sheets.empty();
     SceneSheet& sheet = sheets.emplace_back();
     sheet.name = name;

@@ -13,7 +13,7 @@ namespace subvol {
 struct CutPlane {
   static constexpr int kShortestAxis = -1;  ///< stands for the axis along which the mesh is shortest
   int axis = kShortestAxis;                 ///< 0, 1, 2, or kShortestAxis, which gives the largest section
-  double share = 0.5;    ///< position between the lowest and the highest cell center, in (0, 1)
+  double share = 0.5;                       ///< position between the lowest and the highest cell center, in (0, 1)
 };
 
 /// The regions of a mesh's cells. With at most one, scenes do not show them.

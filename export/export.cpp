@@ -183,8 +183,7 @@ Scene surface_scene(const TessellatedSurface& surface, std::span<const double> p
   ScenePrimitive primitive;
   primitive.positions = surface.positions;
   primitive.normals = surface.normals;
-  for (const auto& [a, b, c, d] : surface.quads)
-    primitive.indices.insert(primitive.indices.end(), {a, b, c, a, c, d});
+  for (const auto& [a, b, c, d] : surface.quads) primitive.indices.insert(primitive.indices.end(), {a, b, c, a, c, d});
   if (!options.face_groups.empty()) {
     std::vector<Index> of_triangle;
     for (const Index patch : surface.quad_patches)

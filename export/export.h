@@ -17,16 +17,16 @@ namespace subvol {
 
 /// Metadata, appearance and resolution of the scene of a surface.
 struct SurfaceSceneOptions {
-  std::string name = "subvol";          ///< name of the root node
+  std::string name = "subvol";  ///< name of the root node
   /// Chord error of a curved surface, in percent of its bounding box's diagonal, > 0.
   double max_chord_percent = 0.005;
-  double crease_angle_degrees = 30;     ///< faces that meet at a larger angle are not shaded smoothly, in [0, 180]
-  bool wireframe = true;                ///< adds a node with the cells' edges as lines
-  bool quantize = false;                ///< writes a smaller file: `Scene::quantize`
-  double meters_per_unit = 1;           ///< > 0
+  double crease_angle_degrees = 30;  ///< faces that meet at a larger angle are not shaded smoothly, in [0, 180]
+  bool wireframe = true;             ///< adds a node with the cells' edges as lines
+  bool quantize = false;             ///< writes a smaller file: `Scene::quantize`
+  double meters_per_unit = 1;        ///< > 0
   UpAxis up_axis = UpAxis::y;
-  std::string source{};                 ///< file that the result was made from; stored in the extras
-  SceneValues options{};                ///< options in force; stored in the extras
+  std::string source{};   ///< file that the result was made from; stored in the extras
+  SceneValues options{};  ///< options in force; stored in the extras
   /// Groups of the boundary faces, in the order of `MeshTopology::boundary_faces()`: each becomes a part of the
   /// surface. Scenes of polygons take those of the polygons in place of these.
   FaceGroups face_groups{};
@@ -79,8 +79,8 @@ Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options 
 struct SceneSheet {
   std::string name;
   PolygonMesh mesh;
-  SceneAttribute attribute{};     ///< one value per vertex; without a name: none
-  std::vector<double> shades{};   ///< one per vertex, colored as `quality_color` colors 0 .. 1; empty: no colors
+  SceneAttribute attribute{};    ///< one value per vertex; without a name: none
+  std::vector<double> shades{};  ///< one per vertex, colored as `quality_color` colors 0 .. 1; empty: no colors
   std::vector<std::array<Index, 2>> wires{};  ///< edges to draw, by vertex; empty: the edges of all polygons
 };
 

@@ -25,7 +25,8 @@ void append_field(std::string& text, const char* name, const std::vector<T>& val
 }
 
 void append_name(std::vector<std::uint8_t>& bytes, std::string name) {
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   bytes.insert(bytes.end(), name.begin(), name.end());
   bytes.push_back('\n');
 }

@@ -16,10 +16,10 @@ namespace subvol::internal {
 /// The faces of a mesh that are in groups, each once, with their points in Gmsh's order.
 struct GroupedFaces {
   std::vector<Group> groups;
-  std::vector<std::uint8_t> sizes;            ///< corners of each face: 3 or 4
+  std::vector<std::uint8_t> sizes;  ///< corners of each face: 3 or 4
   std::vector<int> orders;
-  std::vector<Index> cells;                   ///< first cell of each face
-  std::vector<std::vector<Index>> of_face;    ///< places in `groups`, ascending
+  std::vector<Index> cells;                 ///< first cell of each face
+  std::vector<std::vector<Index>> of_face;  ///< places in `groups`, ascending
   std::vector<std::size_t> offsets{0};
   std::vector<Index> nodes;
 

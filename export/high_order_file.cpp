@@ -114,9 +114,8 @@ void require_gmsh_orders(const ElementSpace& space) {
     const int order = space.pattern_order(space.pattern(c));
     if (order > max_gmsh_order(kind))
       throw InputError("cell " + std::to_string(c) + " is a " + cell_topology(kind).name + " of order " +
-                       std::to_string(order) + ", but Gmsh evaluates a " + cell_topology(kind).name +
-                       " up to order " + std::to_string(max_gmsh_order(kind)) +
-                       " only; write a .vtu, or a .mesh of many linear cells");
+                       std::to_string(order) + ", but Gmsh evaluates a " + cell_topology(kind).name + " up to order " +
+                       std::to_string(max_gmsh_order(kind)) + " only; write a .vtu, or a .mesh of many linear cells");
   }
 }
 
@@ -225,9 +224,7 @@ Basis read_basis(const VtuArrays& file, const std::vector<std::int64_t>& format)
 /// Returns true if the linear shape function of a local vertex does not vanish at a point of the grid of a cell.
 bool touches(CellKind kind, int vertex, const LatticePoint& at, int order) {
   const auto inner = [&](int coordinate, int end) { return end ? coordinate > 0 : coordinate < order; };
-  const auto in_triangle = [&](int corner) {
-    return corner == 0 ? at[0] + at[1] < order : at[corner - 1] > 0;
-  };
+  const auto in_triangle = [&](int corner) { return corner == 0 ? at[0] + at[1] < order : at[corner - 1] > 0; };
   if (kind == CellKind::tet) return vertex == 0 ? at.sum() < order : at[vertex - 1] > 0;
   if (kind == CellKind::prism) return in_triangle(vertex % 3) && inner(at[2], vertex / 3);
   const int along = vertex % 4;
@@ -238,8 +235,7 @@ bool touches(CellKind kind, int vertex, const LatticePoint& at, int order) {
 VolumeFaceGroups small_groups(const HighOrderMesh& mesh, int intervals, const VolumeFaceGroups& groups,
                               const VolumeMesh& cells) {
   const VolumeMesh coarse = mesh.straight_sided();
-  const LagrangeMesh grid =
-      lagrange_mesh(mesh, std::vector<int>(coarse.num_cells(), intervals), NodeOrdering::rows);
+  const LagrangeMesh grid = lagrange_mesh(mesh, std::vector<int>(coarse.num_cells(), intervals), NodeOrdering::rows);
   std::vector<VertexSupport> support(grid.positions.size(), support_of({}));
   std::vector<Index> corners;
   for (std::size_t c = 0; c < coarse.num_cells(); ++c) {
@@ -312,9 +308,8 @@ std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
   const std::vector<int> orders = lagrange_orders(written.mesh.space, kMaxOrder);
   const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::gmsh);
   CellView view = view_of(cells, options.references);
-  const GroupedFaces faces = options.face_groups
-                                 ? grouped_faces(cells, mesh.space.topology(), *options.face_groups)
-                                 : GroupedFaces{};
+  const GroupedFaces faces =
+      options.face_groups ? grouped_faces(cells, mesh.space.topology(), *options.face_groups) : GroupedFaces{};
   view.faces = &faces;
   view.regions = options.regions;
   return msh_document(view, minima_of(written, options),
@@ -343,8 +338,9 @@ HighOrderFile read_high_order(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   const VtuArrays file(path.string(), bytes);
   if (!file.has("subvol_format"))
-    file.fail("expected a high-order mesh as subvol writes it, with the map of its cells in the field data "
-              "(subvol_format, subvol_coefficients, ..); this file has none");
+    file.fail(
+        "expected a high-order mesh as subvol writes it, with the map of its cells in the field data "
+        "(subvol_format, subvol_coefficients, ..); this file has none");
   const auto format = file.get<std::int64_t>("subvol_format");
   const Basis basis = read_basis(file, format);
   const VolumeMesh mesh = read_corners(file, format[2]);

@@ -27,14 +27,14 @@ struct HighOrderFileOptions {
   CellReference reference{};              ///< the cells that these are measured against; empty: the ideal cells
   std::span<const int> references{};      ///< one per cell, or empty: all 0
   const VolumeFaceGroups* face_groups = nullptr;  ///< named faces of the cells; may be null
-  std::span<const Group> regions{};       ///< names of references
-  MshVersion msh_version = MshVersion::v4_1;  ///< of a .msh
-  VtuCells vtu_cells = VtuCells::lagrange;    ///< of a .vtu
+  std::span<const Group> regions{};               ///< names of references
+  MshVersion msh_version = MshVersion::v4_1;      ///< of a .msh
+  VtuCells vtu_cells = VtuCells::lagrange;        ///< of a .vtu
   /// Fields with one number per vertex of the mesh: point data of .vtu and .msh, interpolated linearly (order 1 of the
   /// cell's kind).
   std::span<const VertexField> fields{};
-  int linear_intervals = 0;               ///< `intervals` of `linear_cells` in .mesh and .vtk; 0: the mesh's largest
-                                          ///< order
+  int linear_intervals = 0;  ///< `intervals` of `linear_cells` in .mesh and .vtk; 0: the mesh's largest
+                             ///< order
   /// Largest distance of the polynomial cells of a .vtu or .msh from the map, in percent of the diagonal of the box of
   /// the mesh's vertices. Orders are raised to stay within it (`file_cells`).
   double map_tolerance_percent = kMapTolerancePercent;

@@ -58,8 +58,8 @@ HighOrderPatches::Face HighOrderPatches::make_face(const HighOrderMesh& mesh, In
   Face face{space.kind(c), {}, {}, {}};
   const auto vertices = space.vertices(c);
   for (const Index v : space.topology().face(f))
-    face.corners.push_back(canonical_vertices(face.kind)[std::find(vertices.begin(), vertices.end(), v) -
-                                                         vertices.begin()]);
+    face.corners.push_back(
+        canonical_vertices(face.kind)[std::find(vertices.begin(), vertices.end(), v) - vertices.begin()]);
   // Functions vanish, up to rounding, on the faces that they do not belong to, and others do not vanish at a point so
   // irregular.
   ShapeFunctions at = shapes(face);

@@ -166,8 +166,7 @@ double extent(const CellView& cells, std::size_t c) {
 HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering, NodeSpacing spacing) {
   if (ordering == NodeOrdering::rows) throw InputError("polynomials_of: expected cells whose corners come first");
   const VolumeMesh corners = separate_cells(cells);
-  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, orders_of_cells(MeshTopology(corners), cells)),
-                     corners);
+  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, orders_of_cells(MeshTopology(corners), cells)), corners);
   const ElementSpace& space = mesh.space;
   interpolate(cells, ordering, spacing, space, [&](std::size_t c, const Eigen::MatrixX3d& found) {
     const auto into = space.nodes(c);

@@ -23,7 +23,7 @@ namespace {
 struct LatticeNode {
   enum class On { vertex, edge, face, cell };
   On on = On::cell;
-  int part = 0;                 ///< local number of the vertex, edge or face
+  int part = 0;  ///< local number of the vertex, edge or face
   /// Weights of the local vertices; their sum is order^d with d = 1 for a tet, 2 for a prism, 3 for a hex.
   std::array<std::int64_t, 8> weights{};
 };
@@ -51,8 +51,8 @@ LatticeNode classify(CellKind kind, int order, const LatticePoint& at) {
   };
   if (num_used == 1) {
     node.on = LatticeNode::On::vertex;
-    node.part = static_cast<int>(std::find_if(node.weights.begin(), node.weights.end(), is_positive) -
-                                 node.weights.begin());
+    node.part =
+        static_cast<int>(std::find_if(node.weights.begin(), node.weights.end(), is_positive) - node.weights.begin());
     return node;
   }
   for (int e = 0; e < topology.num_edges; ++e)

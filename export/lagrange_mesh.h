@@ -15,9 +15,9 @@ namespace subvol::internal {
 struct LagrangeMesh {
   std::vector<Vec3> positions;  ///< the mesh's vertices with their numbers, then the other points
   std::vector<CellKind> kinds;
-  std::vector<int> orders;      ///< one per cell
+  std::vector<int> orders;  ///< one per cell
   std::vector<std::size_t> cell_offsets{0};
-  std::vector<Index> cell_nodes;///< points of every cell, in the order of `cell_lattice`
+  std::vector<Index> cell_nodes;  ///< points of every cell, in the order of `cell_lattice`
 
   std::size_t num_cells() const { return kinds.size(); }
   std::span<const Index> cell(std::size_t c) const {

@@ -19,8 +19,7 @@ using namespace internal;
 namespace {
 
 NodalMesh equal_nodes(const HighOrderMesh& mesh, int order) {
-  const LagrangeMesh grid =
-      lagrange_mesh(mesh, std::vector<int>(mesh.space.num_cells(), order), NodeOrdering::vtk);
+  const LagrangeMesh grid = lagrange_mesh(mesh, std::vector<int>(mesh.space.num_cells(), order), NodeOrdering::vtk);
   NodalMesh result;
   result.positions = grid.positions;
   result.kinds = grid.kinds;

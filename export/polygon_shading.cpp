@@ -14,17 +14,17 @@ namespace subvol::internal {
 namespace {
 
 struct Corner {
-  std::size_t entry;   ///< index in face_vertices
+  std::size_t entry;  ///< index in face_vertices
   std::size_t face;
-  Index before, after; ///< the neighbors on the face
+  Index before, after;  ///< the neighbors on the face
 };
 
 std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
   std::vector<std::vector<Corner>> corners(mesh.positions.size());
   for (std::size_t f = 0; f < mesh.num_faces(); ++f)
     for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k)
-      corners[mesh.face_vertices[k]].push_back({k, f, mesh.face_vertices[k == begin ? end - 1 : k - 1],
-                                                mesh.face_vertices[k + 1 == end ? begin : k + 1]});
+      corners[mesh.face_vertices[k]].push_back(
+          {k, f, mesh.face_vertices[k == begin ? end - 1 : k - 1], mesh.face_vertices[k + 1 == end ? begin : k + 1]});
   return corners;
 }
 

@@ -9,8 +9,8 @@ namespace subvol::internal {
 
 /// Polygons with one vertex for every normal: vertices are doubled where faces meet at more than an angle.
 struct ShadedPolygons {
-  std::vector<Vec3> positions, normals;   ///< normals: of unit length
-  std::vector<Index> corner_vertices;     ///< shaded vertex of each entry of the mesh's face_vertices
+  std::vector<Vec3> positions, normals;  ///< normals: of unit length
+  std::vector<Index> corner_vertices;    ///< shaded vertex of each entry of the mesh's face_vertices
 };
 
 /// Averages the normals of faces that meet smoothly.

@@ -126,10 +126,10 @@ class Canvas {
   int width_, height_;
   double scale_;  // samples per unit of length
   Vec3 center_;
-  Mat3 axes_;     // rows: right, up, toward the viewer
+  Mat3 axes_;  // rows: right, up, toward the viewer
   std::vector<double> depths_;
-  std::vector<Vec3> colors_;   // linear
-  std::vector<bool> wired_;    // true if a line has darkened the sample: a second one leaves it
+  std::vector<Vec3> colors_;  // linear
+  std::vector<bool> wired_;   // true if a line has darkened the sample: a second one leaves it
 };
 
 }  // namespace

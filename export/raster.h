@@ -23,7 +23,7 @@ struct RasterView {
   Vec3 towards_viewer = Vec3(0, 0, 1);  ///< any length but zero
   Vec3 up = Vec3(0, 1, 0);              ///< not parallel to towards_viewer
   Vec3 center = Vec3::Zero();
-  double radius = 1;                    ///< > 0, of the ball that fits into the picture's shorter side
+  double radius = 1;  ///< > 0, of the ball that fits into the picture's shorter side
 };
 
 /// Returns a view that shows a mesh well: perpendicular to its bounding box's longest sides, from slightly above and
@@ -34,8 +34,8 @@ RasterView view_of(std::span<const Vec3> positions);
 /// The surface to draw. Both sides of triangles are visible and lit from the viewer's side.
 struct RasterSurface {
   TriangleMesh mesh;
-  std::vector<LinearColor> colors;               ///< one per vertex, or empty: gray
-  std::vector<std::array<Index, 2>> wires;       ///< edges to draw as dark lines where they are visible
+  std::vector<LinearColor> colors;          ///< one per vertex, or empty: gray
+  std::vector<std::array<Index, 2>> wires;  ///< edges to draw as dark lines where they are visible
 };
 
 /// Draws a surface with a depth buffer and 2 x 2 samples per pixel.

@@ -31,16 +31,11 @@ class Numbers {
   int type() const { return accessor_.componentType; }
   double at(std::size_t i, std::size_t component) const {
     switch (type()) {
-      case TINYGLTF_COMPONENT_TYPE_FLOAT:
-        return number<float>(i, component);
-      case TINYGLTF_COMPONENT_TYPE_SHORT:
-        return number<std::int16_t>(i, component);
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        return number<std::uint16_t>(i, component);
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-        return number<std::uint32_t>(i, component);
-      default:
-        return std::nan("");
+      case TINYGLTF_COMPONENT_TYPE_FLOAT: return number<float>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_SHORT: return number<std::int16_t>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return number<std::uint16_t>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return number<std::uint32_t>(i, component);
+      default: return std::nan("");
     }
   }
 

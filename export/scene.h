@@ -24,21 +24,21 @@ struct SceneAttribute {
 /// A run of triangles with a name, which the writer gives a primitive and a material of its own.
 struct ScenePart {
   std::string name;
-  int number = 0;                 ///< of the group that it shows; 0: of none
-  std::size_t first = 0, size = 0;///< places in the indices of the primitive
+  int number = 0;                   ///< of the group that it shows; 0: of none
+  std::size_t first = 0, size = 0;  ///< places in the indices of the primitive
 };
 
 /// The drawing of a node: triangles or line segments over one array of vertices.
 struct ScenePrimitive {
   enum class Topology { triangles, lines };
   Topology topology = Topology::triangles;
-  std::vector<Vec3> positions{};           ///< world positions, in the mesh's length unit
-  std::vector<Vec3> normals{};             ///< unit, one per position; or empty
-  std::vector<LinearColor> colors{};       ///< one per position; or empty
-  std::vector<SceneAttribute> attributes{};///< each with one value per position
-  std::vector<Index> indices{};            ///< 3 per triangle (the two of a quad are consecutive), 2 per segment
-  LinearColor material_color{1, 1, 1, 1};  ///< multiplies `colors`
-  std::vector<ScenePart> parts{};          ///< all indices, one part after another; or empty; not with shapes
+  std::vector<Vec3> positions{};             ///< world positions, in the mesh's length unit
+  std::vector<Vec3> normals{};               ///< unit, one per position; or empty
+  std::vector<LinearColor> colors{};         ///< one per position; or empty
+  std::vector<SceneAttribute> attributes{};  ///< each with one value per position
+  std::vector<Index> indices{};              ///< 3 per triangle (the two of a quad are consecutive), 2 per segment
+  LinearColor material_color{1, 1, 1, 1};    ///< multiplies `colors`
+  std::vector<ScenePart> parts{};            ///< all indices, one part after another; or empty; not with shapes
 };
 
 /// Another shape of the same vertices that an animation passes through ("shape key", "morph target").
@@ -67,15 +67,15 @@ enum class UpAxis { y, z };
 /// Nodes are children of one root node, which scales mesh units to meters, turns z up into y up if asked, and moves by
 /// `origin`; positions are written relative to `origin`, so that single precision keeps its digits far from zero.
 struct Scene {
-  std::string name{};             ///< name of the root node
+  std::string name{};  ///< name of the root node
   std::vector<SceneNode> nodes{};
-  Vec3 origin = Vec3::Zero();     ///< mesh units; the middle of the bounding box is a good choice
-  double meters_per_unit = 1;     ///< > 0
-  UpAxis up_axis = UpAxis::y;     ///< y: axes stay as they are; z: the root turns by -90 degrees about x
-  SceneValues extras{};           ///< source, color map, ...; the writer adds unit, up_axis and version
-  SceneValues options{};          ///< the options in force, written as extras.options
-  double seconds_per_shape = 0.5; ///< time from one shape to the next, > 0
-  bool quantize = false;          ///< positions in 16 bits, normals in 8; shapes are not quantized
+  Vec3 origin = Vec3::Zero();      ///< mesh units; the middle of the bounding box is a good choice
+  double meters_per_unit = 1;      ///< > 0
+  UpAxis up_axis = UpAxis::y;      ///< y: axes stay as they are; z: the root turns by -90 degrees about x
+  SceneValues extras{};            ///< source, color map, ...; the writer adds unit, up_axis and version
+  SceneValues options{};           ///< the options in force, written as extras.options
+  double seconds_per_shape = 0.5;  ///< time from one shape to the next, > 0
+  bool quantize = false;           ///< positions in 16 bits, normals in 8; shapes are not quantized
 };
 
 }  // namespace subvol

@@ -112,8 +112,8 @@ Demand total_demand(const StripCuts& cuts, const std::vector<PatchState>& states
 std::size_t num_quads_above(double threshold, const Demand& demand, const StripCuts& cuts, std::size_t num_patches) {
   std::vector<std::size_t> intervals(demand.size());
   for (std::size_t s = 0; s < demand.size(); ++s)
-    intervals[s] = demand[s].size() + std::count_if(demand[s].begin(), demand[s].end(),
-                                                    [&](double error) { return error > threshold; });
+    intervals[s] = demand[s].size() +
+                   std::count_if(demand[s].begin(), demand[s].end(), [&](double error) { return error > threshold; });
   std::size_t sum = 0;
   for (std::size_t p = 0; p < num_patches; ++p) {
     const auto& [u, v] = cuts.strips(static_cast<Index>(p));

@@ -74,7 +74,8 @@ bool needs_double_precision(const TriangleMesh& mesh) {
 
 /// A name on one line.
 std::string one_line(std::string name) {
-  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, ' ');
   return trimmed(name);
 }
 
@@ -146,8 +147,9 @@ std::string ply_bytes(const PolygonMesh& mesh) {
 std::string vtp_text(const PolygonMesh& mesh) {
   const std::vector<std::int64_t> corners(mesh.face_vertices.begin(), mesh.face_vertices.end());
   const std::vector<std::int64_t> ends(mesh.face_offsets.begin() + 1, mesh.face_offsets.end());
-  std::string text = "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
-                     "header_type=\"UInt64\">\n  <PolyData>\n";
+  std::string text =
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n  <PolyData>\n";
   append_group_fields(text, mesh.face_groups);
   text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) +
           "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
@@ -171,19 +173,25 @@ std::string vtp_text(const PolygonMesh& mesh) {
 std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
-    if (c == '&') result += "&amp;";
-    else if (c == '<') result += "&lt;";
-    else if (c == '"') result += "&quot;";
-    else if (static_cast<unsigned char>(c) < ' ') result += ' ';
-    else result += c;
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '"')
+      result += "&quot;";
+    else if (static_cast<unsigned char>(c) < ' ')
+      result += ' ';
+    else
+      result += c;
   }
   return result;
 }
 
 std::string model_of(const TriangleMesh& mesh) {
   const std::vector<Group>& groups = mesh.face_groups.groups;
-  std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" "
-                     "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\">\n<resources>\n";
+  std::string text =
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"millimeter\" "
+      "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\">\n<resources>\n";
   if (!groups.empty()) {
     text += "<basematerials id=\"1\">\n";
     for (const Group& group : groups)

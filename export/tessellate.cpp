@@ -82,8 +82,8 @@ class Assembler {
     const std::size_t place = grid.corner(k);
     if (corner_vertices_[corner] == kNoIndex) {
       Index& first = first_at_[point];
-      const Index vertex = add_vertex(first == kNoIndex ? grid.positions[place] : Vec3(out_.positions[first]),
-                                      grid.normals[place]);
+      const Index vertex =
+          add_vertex(first == kNoIndex ? grid.positions[place] : Vec3(out_.positions[first]), grid.normals[place]);
       if (first == kNoIndex) first = vertex;
       number_piece(corner, vertex);
     } else {
@@ -161,8 +161,7 @@ void finish_normals(TessellatedSurface& surface) {
   for (const auto& quad : surface.quads)
     for (int k = 0; k < 4; ++k) {
       const Vec3& p = surface.positions[quad[k]];
-      facets[quad[k]] +=
-          (surface.positions[quad[(k + 1) % 4]] - p).cross(surface.positions[quad[(k + 3) % 4]] - p);
+      facets[quad[k]] += (surface.positions[quad[(k + 1) % 4]] - p).cross(surface.positions[quad[(k + 3) % 4]] - p);
     }
   for (std::size_t v = 0; v < facets.size(); ++v) {
     Vec3& normal = surface.normals[v];

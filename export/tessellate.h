@@ -27,13 +27,13 @@ struct SurfacePatch {
 
 /// A surface cut into quads, each to be drawn as the triangles 0 1 2 and 0 2 3 of its corners.
 struct TessellatedSurface {
-  std::vector<Vec3> positions;             ///< on the surface; doubled where a crease separates the normals
-  std::vector<Vec3> normals;               ///< unit, outward, one per position
-  std::vector<std::array<Index, 4>> quads; ///< outward; the quads of one patch are consecutive
-  std::vector<Index> quad_patches;         ///< number in `patches` for each quad
-  std::vector<SurfacePatch> patches;       ///< ordered by face, then corner
+  std::vector<Vec3> positions;                  ///< on the surface; doubled where a crease separates the normals
+  std::vector<Vec3> normals;                    ///< unit, outward, one per position
+  std::vector<std::array<Index, 4>> quads;      ///< outward; the quads of one patch are consecutive
+  std::vector<Index> quad_patches;              ///< number in `patches` for each quad
+  std::vector<SurfacePatch> patches;            ///< ordered by face, then corner
   std::vector<std::array<Index, 2>> wireframe;  ///< the mesh's boundary edges as curves: segments along quad edges
-  double chord_error = 0;                  ///< largest distance from the surface to the triangles, length unit
+  double chord_error = 0;                       ///< largest distance from the surface to the triangles, length unit
 };
 
 /// Cuts a surface of patches until its triangles are close to it.

@@ -12,9 +12,7 @@ void append_vector(std::string& text, const Vec3& vector, const char* separator)
   }
 }
 
-std::string lower_case_extension(const std::filesystem::path& path) {
-  return lower_case(path.extension().string());
-}
+std::string lower_case_extension(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
 
 void require_polygons(const PolygonMesh& mesh, const std::string& what) {
   if (mesh.face_offsets.size() < 2) throw InputError(what + ": expected at least one face");

@@ -272,10 +272,11 @@ std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const Usd
   text += std::string("\n    upAxis = \"") + (options.up_axis == UpAxis::y ? "Y" : "Z") + "\"\n)\n\ndef Mesh \"" +
           options.name + "\"\n{\n";
   append_geometry(text, cage);
-  text += "    uniform token subdivisionScheme = \"catmullClark\"\n"
-          "    token interpolateBoundary = \"edgeAndCorner\"\n"
-          "    token triangleSubdivisionRule = \"catmullClark\"\n"
-          "    uniform token orientation = \"rightHanded\"\n";
+  text +=
+      "    uniform token subdivisionScheme = \"catmullClark\"\n"
+      "    token interpolateBoundary = \"edgeAndCorner\"\n"
+      "    token triangleSubdivisionRule = \"catmullClark\"\n"
+      "    uniform token orientation = \"rightHanded\"\n";
   append_tags(text, tags);
   append_groups(text, cage.face_groups);
   text += "}\n";

@@ -13,9 +13,9 @@ namespace subvol {
 
 /// Entries for the head of a .usda file.
 struct UsdOptions {
-  std::string name = "cage";   ///< name of the prim: letters, digits, underscores; no digit first
-  double meters_per_unit = 1;  ///< > 0
-  UpAxis up_axis = UpAxis::y;  ///< declared, not applied: coordinates are written unchanged
+  std::string name = "cage";         ///< name of the prim: letters, digits, underscores; no digit first
+  double meters_per_unit = 1;        ///< > 0
+  UpAxis up_axis = UpAxis::y;        ///< declared, not applied: coordinates are written unchanged
   const VolumeMesh* tets = nullptr;  ///< cells, all tets, to write as a TetMesh "cells" beside the cage; null: none
 };
 

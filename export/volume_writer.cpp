@@ -70,8 +70,8 @@ void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std
   }
   if (extension != ".vtu" && extension != ".msh")
     throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo or .xdmf");
-  write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields)
-                                                  : msh_text(mesh, cell_minima, fields, version));
+  write_file_atomically(
+      path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields) : msh_text(mesh, cell_minima, fields, version));
 }
 
 }  // namespace subvol

@@ -18,13 +18,21 @@ static_assert(std::endian::native == std::endian::little, "the arrays of a .vtu 
 template <class T>
 constexpr const char* vtu_type();
 template <>
-constexpr const char* vtu_type<double>() { return "Float64"; }
+constexpr const char* vtu_type<double>() {
+  return "Float64";
+}
 template <>
-constexpr const char* vtu_type<std::int32_t>() { return "Int32"; }
+constexpr const char* vtu_type<std::int32_t>() {
+  return "Int32";
+}
 template <>
-constexpr const char* vtu_type<std::int64_t>() { return "Int64"; }
+constexpr const char* vtu_type<std::int64_t>() {
+  return "Int64";
+}
 template <>
-constexpr const char* vtu_type<std::uint8_t>() { return "UInt8"; }
+constexpr const char* vtu_type<std::uint8_t>() {
+  return "UInt8";
+}
 
 /// Appends a `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and any others.
 template <class T>

@@ -38,8 +38,8 @@ std::size_t cells_after(std::size_t cells, int levels);
 /// `kLeastTemplateCells`.
 std::size_t cells_before(std::size_t cells, int levels);
 
-/// Drops numbers of cells whose templates, which are subdivided so many times, have as many cells as those of the number
-/// before.
+/// Drops numbers of cells whose templates, which are subdivided so many times, have as many cells as those of the
+/// number before.
 void drop_equal_templates(int levels, std::vector<std::size_t>& counts);
 
 /// Returns the attempts to make, in this order, until a fit is good.

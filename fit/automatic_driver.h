@@ -124,8 +124,8 @@ class AutomaticDriver {
   FitTarget target_;
   VolumeMesh mesh_;
   std::optional<FittedCage> cage_;  ///< of the present mesh; none: its own vertices are the unknowns
-  std::string no_template_;     ///< why the last template that was asked for does not exist; empty: it does
-  QualityStages::State state_;  ///< that the last level reached; its share is that of the lower goal at caps
+  std::string no_template_;         ///< why the last template that was asked for does not exist; empty: it does
+  QualityStages::State state_;      ///< that the last level reached; its share is that of the lower goal at caps
   AutomaticFitResult result_;
   StageRunner runner_;
 
@@ -140,14 +140,14 @@ class AutomaticDriver {
   std::vector<Index> hopeless_cells(bool may_meet) const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 
-  bool has_started_ = false;        ///< a mesh has been fitted
-  bool is_relaxing_ = false;        ///< `relax_hopeless_cells` precedes the stages
-  std::optional<Vec3> relaxed_at_;  ///< its first place, in the target's coordinates
-  std::vector<FitState> states_;  ///< of the present mesh, if they are kept
+  bool has_started_ = false;                          ///< a mesh has been fitted
+  bool is_relaxing_ = false;                          ///< `relax_hopeless_cells` precedes the stages
+  std::optional<Vec3> relaxed_at_;                    ///< its first place, in the target's coordinates
+  std::vector<FitState> states_;                      ///< of the present mesh, if they are kept
   std::vector<std::size_t> stages_, stages_of_best_;  ///< that led to the present mesh, to that of the best trial
-  std::optional<std::size_t> taken_best_;     ///< number of the trial at `take_states`
+  std::optional<std::size_t> taken_best_;             ///< number of the trial at `take_states`
   std::optional<std::size_t> last_polished_;  ///< number of the trial that was polished, or is the result of that
-  double share_at_end_ = 0;       ///< of the attempt in progress
+  double share_at_end_ = 0;                   ///< of the attempt in progress
 };
 
 }  // namespace subvol::internal

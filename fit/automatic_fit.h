@@ -67,7 +67,7 @@ struct AutomaticFitOptions {
   int levels = 1;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   SolveControl control{};
-  bool keep_states = false;           ///< fills AutomaticFitResult::states
+  bool keep_states = false;  ///< fills AutomaticFitResult::states
 };
 
 /// A sharp edge of the target that no edges of the mesh follow, or not all along.
@@ -80,7 +80,7 @@ struct MissedEdge {
 /// One template that was fitted, and what came out.
 struct AutomaticFitTrial {
   std::size_t template_cells = 0, cells = 0;
-  bool through_planes = false;                  ///< the template's grid lines pass through planes of the target
+  bool through_planes = false;  ///< the template's grid lines pass through planes of the target
   std::size_t grids = 1;  ///< grids on which the edges were laid out until one lost no long edges; this is the last
   std::size_t refined_cells = 0;                ///< of the grid or mesh after some of its cells were cut; 0: none was
   std::size_t pads = 0;                         ///< layers of cells under patches between sharp edges
@@ -104,8 +104,8 @@ struct AutomaticFitTrial {
   /// coordinates; empty: there was none.
   std::optional<Vec3> relaxed_at;
   std::size_t wrong_sheets = 0;  ///< of a target with regions: those whose topology the template does not have
-  bool is_polished = false;                       ///< it is the trial before, lifted beyond the quality aimed at
-  double merit = 0;                               ///< 0: all aims are reached; lower is better
+  bool is_polished = false;      ///< it is the trial before, lifted beyond the quality aimed at
+  double merit = 0;              ///< 0: all aims are reached; lower is better
 };
 
 /// The best trial of an automatic fit, and what was tried.
@@ -116,7 +116,7 @@ struct AutomaticFitResult {
   BettiNumbers topology;                 ///< of the solid
   std::vector<MissedEdge> missed_edges;  ///< the longest first
   std::vector<AutomaticFitTrial> trials;
-  std::size_t chosen = 0;  ///< position in trials
+  std::size_t chosen = 0;        ///< position in trials
   std::vector<FitState> states;  ///< of the chosen trial's last mesh, from its start; without the result
 };
 
@@ -163,8 +163,8 @@ struct AutomaticFitResult {
 /// best trial is too far from the target, meets itself or has poor cells (`fit/fits/graded_template.h`).
 ///
 /// If no trial is good still, cells of the best one are cut in 27 where it meets itself, where it is too far from the
-/// target, and where cells are poor (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to the number
-/// of cells allowed, or half as many again if the number is free. Meshes that follow edges are not refined.
+/// target, and where cells are poor (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to the
+/// number of cells allowed, or half as many again if the number is free. Meshes that follow edges are not refined.
 ///
 /// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///

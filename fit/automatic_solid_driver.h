@@ -79,8 +79,8 @@ class AutomaticSolidDriver : protected AutomaticDriver {
   std::vector<UnfollowedCurve> unfollowed_curves() const;
 
   std::optional<SolidBoundary> solid_;  ///< of original_, once it was needed
-  FlatFacets facets_;         ///< of `target_.mesh`, if edges are followed
-  LevelLayout level_layout_;  ///< of mesh_, from layout_
+  FlatFacets facets_;                   ///< of `target_.mesh`, if edges are followed
+  LevelLayout level_layout_;            ///< of mesh_, from layout_
 };
 
 }  // namespace subvol::internal

@@ -192,11 +192,11 @@ void conclude_fit(AutomaticFitResult& result, const AutomaticFitOptions& options
                   chosen.least_scaled_jacobian, options.quality));
   if (const std::optional<CreaseDistance>& edges = report.creases;
       edges && edges->num_followed > 0 && edges->max_percent() > options.max_tolerance_percent)
-    report.warnings.push_back(
-        formatted("creases are up to %.3g %% of the diagonal away from the sharp edges that they follow, the farthest at "
-                  "(%.6g, %.6g, %.6g); %.3g %% of the length of all edges is within %g %%",
-                  edges->max_percent(), edges->farthest.x(), edges->farthest.y(), edges->farthest.z(),
-                  100 * edges->within_share(), kSharpPercent));
+    report.warnings.push_back(formatted(
+        "creases are up to %.3g %% of the diagonal away from the sharp edges that they follow, the farthest at "
+        "(%.6g, %.6g, %.6g); %.3g %% of the length of all edges is within %g %%",
+        edges->max_percent(), edges->farthest.x(), edges->farthest.y(), edges->farthest.z(),
+        100 * edges->within_share(), kSharpPercent));
   if (chosen.feature_miss && chosen.feature_miss->share > kAutomaticFeatureShare) {
     const FeatureMiss& miss = *chosen.feature_miss;
     report.warnings.push_back(

@@ -36,8 +36,8 @@ class HighOrderDriver : protected StagedFit {
   struct Outcome {
     std::vector<double> cell_minima{};  ///< least scaled Jacobian of each cell
     double least_scaled_jacobian = 0, mean_percent = 0;
-    double max_percent = 0;  ///< of surfaces, and of creases from their curves
-    std::size_t pairs = 0;  ///< number of intersecting triangle pairs
+    double max_percent = 0;     ///< of surfaces, and of creases from their curves
+    std::size_t pairs = 0;      ///< number of intersecting triangle pairs
     double volume_percent = 0;  ///< `volume_percent()`
   };
 
@@ -101,15 +101,15 @@ class HighOrderDriver : protected StagedFit {
   HighOrderSchedule schedule_;
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
-  int try_ = 0;              ///< number of the current attempt, from 1
-  int order_ = 1;            ///< highest order of any entity
+  int try_ = 0;    ///< number of the current attempt, from 1
+  int order_ = 1;  ///< highest order of any entity
   /// States before the stages of the schedule in the current attempt, raised to the present orders.
   std::vector<FitSnapshot> starts_;
-  std::vector<int> points_;  ///< quadrature points of each cell per direction in the last stage
-  bool stays_dense_ = false; ///< set after the first orders: cells keep at least points_
-  double emphasis_ = 0;      ///< emphasis on places of poor shape in E_W
-  double hinge_ = 0;         ///< weight of low scaled Jacobians in E_W
-  double far_length_ = 0;    ///< distance at which places count twice in E_S; 0: all places count alike
+  std::vector<int> points_;   ///< quadrature points of each cell per direction in the last stage
+  bool stays_dense_ = false;  ///< set after the first orders: cells keep at least points_
+  double emphasis_ = 0;       ///< emphasis on places of poor shape in E_W
+  double hinge_ = 0;          ///< weight of low scaled Jacobians in E_W
+  double far_length_ = 0;     ///< distance at which places count twice in E_S; 0: all places count alike
   FitReport report_;
   MemoryBudget memory_;
   StageRunner runner_;

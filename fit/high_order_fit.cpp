@@ -114,7 +114,7 @@ bool HighOrderFit::run_first_orders(int last) {
     Approach approach;
     std::vector<FitState> states;
     std::vector<FitSnapshot> starts;
-    int number;  ///< number of the attempt
+    int number;                            ///< number of the attempt
     std::size_t stages_begin, stages_end;  ///< in the report
   };
   std::optional<Arrival> best;
@@ -156,10 +156,9 @@ bool HighOrderFit::run_first_orders(int last) {
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
     const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
-    Arrival arrival{*folded, measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
-                    states_, starts_, try_, stages_begin, report_.stages.size()};
-    const bool better =
-        !best || std::tuple(arrival.folded, arrival.energy) < std::tuple(best->folded, best->energy);
+    Arrival arrival{*folded,   measured_mean(), distortion, energy, mesh_,        ideal_boxes_,         points_,
+                    approach_, states_,         starts_,    try_,   stages_begin, report_.stages.size()};
+    const bool better = !best || std::tuple(arrival.folded, arrival.energy) < std::tuple(best->folded, best->energy);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (!best->folded && fair) break;

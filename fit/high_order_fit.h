@@ -18,7 +18,7 @@ inline constexpr double kLambdaOfOrders = 0.05, kCurvingLambda = 0.0025;
 
 /// Options of `fit_high_order`.
 struct HighOrderFitOptions {
-  int order = 4;                                 ///< order of the finished mesh, 1..kMaxOrder
+  int order = 4;  ///< order of the finished mesh, 1..kMaxOrder
   /// Legendre modes are polynomials, which .vtu and .msh store exactly. Fourier modes (paper: section 3.2) are written
   /// to these formats as approximating polynomials.
   Basis basis = Basis::legendre;
@@ -39,14 +39,14 @@ struct HighOrderFitOptions {
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points
-  Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
+  Distortion distortion = Distortion::hencky;        ///< the distortion e in E_W
   /// After the last stage, brings places far from the target closer and improves places of poor shape if that costs
   /// little elsewhere.
   bool improve_worst_places = true;
-  double quality = kUsualQuality;                ///< least scaled Jacobian to aim at then, in [0, 0.8]; 0: none
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at then, in [0, 0.8]; 0: none
   SolveControl control{};
-  double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
-  bool keep_states = false;                      ///< fills HighOrderFitResult::states
+  double memory_limit_bytes = 0;  ///< for the whole process, see `MemoryBudget`; 0: no limit
+  bool keep_states = false;       ///< fills HighOrderFitResult::states
 };
 
 /// The curved mesh, and how the fit went.

@@ -265,8 +265,7 @@ void append_distance(std::string& text, const MeshCheck& check) {
 
 void require_samples(int per_direction) {
   if (per_direction < 2)
-    throw InputError("mesh check: samples_per_direction is " + std::to_string(per_direction) +
-                     ", expected 2 or more");
+    throw InputError("mesh check: samples_per_direction is " + std::to_string(per_direction) + ", expected 2 or more");
 }
 
 MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {

@@ -30,11 +30,11 @@ enum class QuadTriangles {
 
 /// Options of `check_mesh`.
 struct MeshCheckOptions {
-  int samples_per_direction = 5;   ///< for the scaled Jacobian, >= 2
+  int samples_per_direction = 5;  ///< for the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< as in `SurfaceDistanceOptions`
   bool audits_subdivision = true;  ///< reports what would degrade a subdivision of the mesh
-  CellLabels labels{};  ///< of curved cells, whose mesh does not hold them; empty: one region
+  CellLabels labels{};             ///< of curved cells, whose mesh does not hold them; empty: one region
   /// Called before each part with its name: "quality", "topology", "self-intersections", "nesting" if
   /// the boundary has several parts, and, if there are a target and a boundary, "distance". Also called repeatedly
   /// during the search for self-intersections and that of parts that lie in others.
@@ -44,9 +44,9 @@ struct MeshCheckOptions {
 /// Orders and number of nodes of a high-order mesh.
 struct OrderSummary {
   Basis basis;
-  int min_order, max_order;                                ///< of edges, faces and cells
+  int min_order, max_order;  ///< of edges, faces and cells
   std::size_t num_nodes;
-  std::size_t num_full_order_nodes;                        ///< number of nodes if every entity had the largest order
+  std::size_t num_full_order_nodes;  ///< number of nodes if every entity had the largest order
 };
 /// Counts the nodes of a space and finds its orders.
 OrderSummary order_summary(const ElementSpace& space);
@@ -62,43 +62,43 @@ struct InversionWitness {
 /// All results of checking a volume mesh. Parts that were not checked, because defects rule them out or the progress
 /// callback ended the check, keep their defaults and appear neither in the text nor in reports.
 struct MeshCheck {
-  bool ended_early = false;                                  ///< true if the progress callback ended the check
+  bool ended_early = false;  ///< true if the progress callback ended the check
 
-  std::vector<MeshDefect> defects;                           ///< those of `validate`
+  std::vector<MeshDefect> defects;  ///< those of `validate`
 
   std::size_t num_vertices = 0, num_cells = 0;
   std::array<std::size_t, kNumCellKinds> num_cells_of_kind{};  ///< by CellKind: tets, prisms, hexes, pyramids
-  std::optional<OrderSummary> orders;                        ///< for a high-order mesh
+  std::optional<OrderSummary> orders;                          ///< for a high-order mesh
 
-  bool has_topology = false;                                 ///< true if the numbers below are set
+  bool has_topology = false;  ///< true if the numbers below are set
   std::size_t num_edges = 0, num_faces = 0;
   std::size_t num_boundary_vertices = 0, num_boundary_edges = 0, num_boundary_faces = 0;
-  std::size_t num_components = 0;                            ///< of cells connected by common faces
-  std::size_t num_boundary_components = 0;                   ///< of boundary faces connected by common vertices
-  long boundary_euler_number = 0;                            ///< V - E + F of the boundary
-  long euler_number = 0;                                     ///< V - E + F - C of the cells, without unused vertices
+  std::size_t num_components = 0;           ///< of cells connected by common faces
+  std::size_t num_boundary_components = 0;  ///< of boundary faces connected by common vertices
+  long boundary_euler_number = 0;           ///< V - E + F of the boundary
+  long euler_number = 0;                    ///< V - E + F - C of the cells, without unused vertices
 
   std::optional<SubdivisionAudit> subdivision_audit;  ///< findings that degrade a subdivision of the mesh; not defects
 
-  std::optional<QualityReport> quality;                      ///< includes the certificate
-  std::optional<RegionReport> regions;  ///< if the cells have several references; area and volume of each, interfaces
-  std::vector<InversionWitness> witnesses;                   ///< one for each of the first ten refuted cells
+  std::optional<QualityReport> quality;  ///< includes the certificate
+  std::optional<RegionReport> regions;   ///< if the cells have several references; area and volume of each, interfaces
+  std::vector<InversionWitness> witnesses;  ///< one for each of the first ten refuted cells
 
-  bool has_boundary_geometry = false;                        ///< true if the numbers below are set
-  double chord_error = 0;                                    ///< of the triangles that represent a curved boundary
-  double volume = 0;                                         ///< signed volume enclosed by the boundary's triangles
+  bool has_boundary_geometry = false;  ///< true if the numbers below are set
+  double chord_error = 0;              ///< of the triangles that represent a curved boundary
+  double volume = 0;                   ///< signed volume enclosed by the boundary's triangles
   /// Positions in `boundary_faces()`, ascending; both may be equal.
   std::vector<std::array<Index, 2>> intersecting_faces;
-  std::size_t num_intersecting_triangle_pairs = 0;           ///< if `kMostIntersectingPairs`: at least that many
-  std::size_t num_degenerate_boundary_triangles = 0;         ///< of zero area: not checked for intersections
+  std::size_t num_intersecting_triangle_pairs = 0;    ///< if `kMostIntersectingPairs`: at least that many
+  std::size_t num_degenerate_boundary_triangles = 0;  ///< of zero area: not checked for intersections
   /// Holds a vertex of each part of the boundary that faces the wrong way: the part bounds a solid inside another
   /// solid, which no intersection shows. It stays empty if the boundary has one component, meets itself, or is not
   /// closed.
   std::vector<Vec3> parts_inside_solids;
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary
-  std::optional<NormalDeviation> normals;  ///< between the boundary and a target of triangles
-  double target_diagonal = 0;              ///< diagonal of the target's bounding box: 100 percent
+  std::optional<NormalDeviation> normals;   ///< between the boundary and a target of triangles
+  double target_diagonal = 0;               ///< diagonal of the target's bounding box: 100 percent
 
   /// Returns true if the mesh can be used as it is: it has no defects except unused vertices, every cell is certified,
   /// the boundary's triangles (those with an area) do not intersect, and no solid lies in another. Returns false if one

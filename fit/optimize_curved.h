@@ -16,7 +16,7 @@ struct CurvedOptimizeOptions {
   /// True: all nodes of the boundary and of interfaces stay; false: those on flat faces move within their planes, and
   /// those on straight borders along them.
   bool fixed_boundary = false;
-  double quality = kUsualQuality;                    ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
   SolveControl control{};
 };
 

@@ -134,7 +134,7 @@ class MeshOptimizer : OptimizeDriver {
 
   std::vector<Index> uncertified_;
   double releases_below_ = kPoorJacobian;  ///< cells below it may move corners of sharp edges
-  bool gains_ended_ = false;  ///< true if the rounds ended because they no longer gained
+  bool gains_ended_ = false;               ///< true if the rounds ended because they no longer gained
 };
 
 bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options) {

@@ -20,7 +20,7 @@ enum class CellSizes {
 
 /// Options of `optimize_mesh`.
 struct OptimizeOptions {
-  bool fixed_boundary = false;           ///< true: boundary vertices stay; false: they slide along the surface
+  bool fixed_boundary = false;  ///< true: boundary vertices stay; false: they slide along the surface
   CellSizes sizes = CellSizes::local;
   /// Edges of the surface sharper than this angle stay sharp; without a target, so do the creases in the mesh's tags.
   /// Vertices on these edges slide along them. In [0, 180].
@@ -28,7 +28,7 @@ struct OptimizeOptions {
   /// Weight of the cells' shape, > 0. It is lowered while the mean distance between the boundary and its surface is too
   /// large. If the largest distance is too large, only the cells beside such places get less weight.
   double lambda = 0.1;
-  double quality = kUsualQuality;        ///< least scaled Jacobian to aim at first, in [0, 0.8]; 0: none
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at first, in [0, 0.8]; 0: none
   /// Largest acceptable distances, in percent of the diagonal, > 0.
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
   SolveControl control{};

@@ -17,7 +17,7 @@ struct FitResult {
   /// The last control mesh with its tags; its limit surface is the fitted surface. Without cells if the mesh was freed
   /// from it (`FitOptions::frees_mesh`).
   VolumeMesh cage;
-  VolumeMesh mesh;   ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)
+  VolumeMesh mesh;  ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)
   FitReport report;
   /// Positions of the cage before each minimization that was kept, starting with the template; filled if asked for.
   std::vector<FitState> states;

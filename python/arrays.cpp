@@ -32,8 +32,8 @@ py::array numbers_from(const py::object& object, const char* name, const char* k
 }
 
 void require_shape(const py::array& array, const char* name, std::size_t columns) {
-  const bool fits = columns == 0 ? array.ndim() == 1
-                                 : array.ndim() == 2 && static_cast<std::size_t>(array.shape(1)) == columns;
+  const bool fits =
+      columns == 0 ? array.ndim() == 1 : array.ndim() == 2 && static_cast<std::size_t>(array.shape(1)) == columns;
   if (fits || (array.size() == 0 && array.ndim() == 1)) return;
   throw InputError(std::string(name) + " must have the shape (n," + (columns ? " " + std::to_string(columns) : "") +
                    "), not " + shape_text(array));

@@ -149,9 +149,11 @@ max_iterations, time_limit, checkpoint, every, resume, chord, progress and threa
 void add_fill(py::module_& module) {
   using Type = py::class_<Filled, Reported, std::shared_ptr<Filled>>;
   Type type(module, "FillResult", "What `fill` returns.");
-  type.def_property_readonly("cage", [](const Filled& filled) { return filled.cage; },
-                             "The control mesh whose limit surface is fitted: VolumeMesh; None unless asked for.");
-  type.def_property_readonly("mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
+  type.def_property_readonly(
+      "cage", [](const Filled& filled) { return filled.cage; },
+      "The control mesh whose limit surface is fitted: VolumeMesh; None unless asked for.");
+  type.def_property_readonly(
+      "mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
   module.def(
       "fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },
       py::arg("target"), kFillHelp);

@@ -152,8 +152,8 @@ class Fit {
     work_.watch(subdivision_.control);
     FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](internal::StageLog* log) {
       subdivision_.control.log = log;
-      return std::visit(
-          [&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
+      return std::visit([&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); },
+                        target_);
     });
     const MeshCheck found = work_.run("check", [&] {
       return std::visit([&](const auto& target) { return check_mesh(fit.mesh, &target); }, target_);
@@ -314,11 +314,12 @@ void require_chord(double percent) {
 
 void add_fits(py::module_& module) {
   py::class_<Reported, std::shared_ptr<Reported>>(module, "Result", "A result and its report.")
-      .def_property_readonly("report", [](const Reported& result) { return result.report; },
-                             "What was done and what is true of the result: dict, with the entries of docs/cli.md.");
+      .def_property_readonly(
+          "report", [](const Reported& result) { return result.report; },
+          "What was done and what is true of the result: dict, with the entries of docs/cli.md.");
   py::class_<Fitted, Reported, std::shared_ptr<Fitted>> type(module, "FitResult", "What `fit` returns.");
-  type.def_property_readonly("template", [](const Fitted& fit) { return fit.template_mesh; },
-                             "The template: VolumeMesh.");
+  type.def_property_readonly(
+      "template", [](const Fitted& fit) { return fit.template_mesh; }, "The template: VolumeMesh.");
   type.def_property_readonly(
       "cage", [](const Fitted& fit) { return fit.cage; },
       "The control mesh whose limit surface is fitted: VolumeMesh; None of curved cells and of a mesh "
@@ -335,9 +336,12 @@ void add_fits(py::module_& module) {
       },
       "Where the cage's points, or the coefficients of curved cells, were before each minimization, if kept: list of\n"
       "(name, array).");
-  module.def("fit", [](const py::object& target, const py::object& template_mesh, const py::kwargs& given) {
-    return Fit(target, template_mesh, given).run();
-  }, py::arg("target"), py::arg("template") = py::none(), kFitHelp);
+  module.def(
+      "fit",
+      [](const py::object& target, const py::object& template_mesh, const py::kwargs& given) {
+        return Fit(target, template_mesh, given).run();
+      },
+      py::arg("target"), py::arg("template") = py::none(), kFitHelp);
 }
 
 }  // namespace subvol::python

@@ -99,8 +99,8 @@ py::array faces_shown(const VolumeFaceGroups& groups, const py::object& owner) {
 }
 
 py::array places_shown(const VolumeFaceGroups& groups, const py::object& owner) {
-  return shown(groups.faces.empty() ? nullptr : &groups.faces[0].group,
-               {static_cast<py::ssize_t>(groups.faces.size())}, owner, false, {sizeof(GroupedFace)});
+  return shown(groups.faces.empty() ? nullptr : &groups.faces[0].group, {static_cast<py::ssize_t>(groups.faces.size())},
+               owner, false, {sizeof(GroupedFace)});
 }
 
 py::dict region_names(const std::vector<Group>& regions) {

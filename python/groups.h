@@ -43,17 +43,18 @@ inline constexpr const char* kPlacesHelp =
 /// Adds these properties to the class of a mesh with the member `face_groups`.
 template <class Mesh, class... Extra>
 void add_groups(py::class_<Mesh, Extra...>& type) {
-  type.def_property_readonly("group_names", [](const Mesh& mesh) { return names_of(mesh.face_groups.groups); },
-                             kNamesHelp);
-  type.def_property_readonly("group_numbers", [](const py::object& self) {
-    return numbers_of(self.cast<const Mesh&>().face_groups.groups, self);
-  }, kNumbersHelp);
-  type.def_property_readonly("grouped_faces", [](const py::object& self) {
-    return faces_shown(self.cast<const Mesh&>().face_groups, self);
-  }, kFacesHelp);
-  type.def_property_readonly("face_groups", [](const py::object& self) {
-    return places_shown(self.cast<const Mesh&>().face_groups, self);
-  }, kPlacesHelp);
+  type.def_property_readonly(
+      "group_names", [](const Mesh& mesh) { return names_of(mesh.face_groups.groups); }, kNamesHelp);
+  type.def_property_readonly(
+      "group_numbers",
+      [](const py::object& self) { return numbers_of(self.cast<const Mesh&>().face_groups.groups, self); },
+      kNumbersHelp);
+  type.def_property_readonly(
+      "grouped_faces", [](const py::object& self) { return faces_shown(self.cast<const Mesh&>().face_groups, self); },
+      kFacesHelp);
+  type.def_property_readonly(
+      "face_groups", [](const py::object& self) { return places_shown(self.cast<const Mesh&>().face_groups, self); },
+      kPlacesHelp);
 }
 
 }  // namespace subvol::python

@@ -94,32 +94,44 @@ std::vector<Vec3> points_for(const py::object& object, std::size_t wanted) {
 
 void add_sparse_map(py::module_& module) {
   py::class_<SparseMap, std::shared_ptr<SparseMap>> type(module, "SparseMap",
-      R"(A sparse matrix by rows (CSR) that maps points to points.
+                                                         R"(A sparse matrix by rows (CSR) that maps points to points.
 
 scipy.sparse.csr_matrix((S.data, S.indices, S.indptr), shape=S.shape) is the same matrix; columns of a row ascend.)");
-  type.def_property_readonly("shape", [](const SparseMap& map) { return py::make_tuple(map.num_rows(), map.num_cols); },
-                             "(rows, columns).");
-  type.def_property_readonly("data", [](const py::object& self) {
-    const auto& values = self.cast<const SparseMap&>().values;
-    return shown(values.data(), {static_cast<py::ssize_t>(values.size())}, self);
-  }, "The entries: float64. A view.");
-  type.def_property_readonly("indices", [](const py::object& self) {
-    const auto& columns = self.cast<const SparseMap&>().columns;
-    return shown(columns.data(), {static_cast<py::ssize_t>(columns.size())}, self);
-  }, "Their columns: int32. A view.");
-  type.def_property_readonly("indptr", [](const py::object& self) {
-    return shown_offsets(self.cast<const SparseMap&>().offsets, self);
-  }, "Where each row begins, and the end: (rows + 1,) int64. A view.");
-  type.def("apply", [](const SparseMap& map, const py::object& points) {
-    const std::vector<Vec3> in = points_for(points, map.num_cols);
-    return moved_points(map.apply(in));
-  }, py::arg("points"), "apply($self, points)\n--\n\nThe matrix times (columns, 3) numbers: (rows, 3) float64.");
-  type.def("apply_transposed", [](const SparseMap& map, const py::object& points) {
-    const std::vector<Vec3> in = points_for(points, map.num_rows());
-    std::vector<Vec3> out(map.num_cols);
-    map.apply_transposed(in, out);
-    return moved_points(std::move(out));
-  }, py::arg("points"), "apply_transposed($self, points)\n--\n\nThe transpose times (rows, 3) numbers: (columns, 3).");
+  type.def_property_readonly(
+      "shape", [](const SparseMap& map) { return py::make_tuple(map.num_rows(), map.num_cols); }, "(rows, columns).");
+  type.def_property_readonly(
+      "data",
+      [](const py::object& self) {
+        const auto& values = self.cast<const SparseMap&>().values;
+        return shown(values.data(), {static_cast<py::ssize_t>(values.size())}, self);
+      },
+      "The entries: float64. A view.");
+  type.def_property_readonly(
+      "indices",
+      [](const py::object& self) {
+        const auto& columns = self.cast<const SparseMap&>().columns;
+        return shown(columns.data(), {static_cast<py::ssize_t>(columns.size())}, self);
+      },
+      "Their columns: int32. A view.");
+  type.def_property_readonly(
+      "indptr", [](const py::object& self) { return shown_offsets(self.cast<const SparseMap&>().offsets, self); },
+      "Where each row begins, and the end: (rows + 1,) int64. A view.");
+  type.def(
+      "apply",
+      [](const SparseMap& map, const py::object& points) {
+        const std::vector<Vec3> in = points_for(points, map.num_cols);
+        return moved_points(map.apply(in));
+      },
+      py::arg("points"), "apply($self, points)\n--\n\nThe matrix times (columns, 3) numbers: (rows, 3) float64.");
+  type.def(
+      "apply_transposed",
+      [](const SparseMap& map, const py::object& points) {
+        const std::vector<Vec3> in = points_for(points, map.num_rows());
+        std::vector<Vec3> out(map.num_cols);
+        map.apply_transposed(in, out);
+        return moved_points(std::move(out));
+      },
+      py::arg("points"), "apply_transposed($self, points)\n--\n\nThe transpose times (rows, 3) numbers: (columns, 3).");
   type.def("__repr__", [](const SparseMap& map) {
     return "<subvol.SparseMap: " + std::to_string(map.num_rows()) + " x " + std::to_string(map.num_cols) + ", " +
            std::to_string(map.num_nonzeros()) + " entries>";

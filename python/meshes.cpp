@@ -85,26 +85,38 @@ template <class Mesh, class... Extra>
 void add_tags(py::class_<Mesh, Extra...>& type) {
   constexpr py::ssize_t kCreaseRecordBytes = sizeof(CreaseEdge), kCornerRecordBytes = sizeof(CornerVertex),
                         kIndexBytes = sizeof(Index);
-  type.def_property_readonly("creases", [](const py::object& self) {
-    const auto& creases = self.cast<const Mesh&>().tags.creases;
-    return shown(creases.empty() ? nullptr : &creases[0].v0, {static_cast<py::ssize_t>(creases.size()), 2}, self, false,
-                 {kCreaseRecordBytes, kIndexBytes});
-  }, "Boundary edges kept sharp: (n, 2) int32, the smaller point first. A view.");
-  type.def_property_readonly("crease_sharpness", [](const py::object& self) {
-    const auto& creases = self.cast<const Mesh&>().tags.creases;
-    return shown(creases.empty() ? nullptr : &creases[0].sharpness, {static_cast<py::ssize_t>(creases.size())}, self,
-                 false, {kCreaseRecordBytes});
-  }, "Refinements each crease stays sharp for: (n,) float64; from 10 on for ever. A view.");
-  type.def_property_readonly("corners", [](const py::object& self) {
-    const auto& corners = self.cast<const Mesh&>().tags.corners;
-    return shown(corners.empty() ? nullptr : &corners[0].vertex, {static_cast<py::ssize_t>(corners.size())}, self,
-                 false, {kCornerRecordBytes});
-  }, "Boundary points kept in their place: (n,) int32. A view.");
-  type.def_property_readonly("corner_sharpness", [](const py::object& self) {
-    const auto& corners = self.cast<const Mesh&>().tags.corners;
-    return shown(corners.empty() ? nullptr : &corners[0].sharpness, {static_cast<py::ssize_t>(corners.size())}, self,
-                 false, {kCornerRecordBytes});
-  }, "As crease_sharpness, of the corners: (n,) float64. A view.");
+  type.def_property_readonly(
+      "creases",
+      [](const py::object& self) {
+        const auto& creases = self.cast<const Mesh&>().tags.creases;
+        return shown(creases.empty() ? nullptr : &creases[0].v0, {static_cast<py::ssize_t>(creases.size()), 2}, self,
+                     false, {kCreaseRecordBytes, kIndexBytes});
+      },
+      "Boundary edges kept sharp: (n, 2) int32, the smaller point first. A view.");
+  type.def_property_readonly(
+      "crease_sharpness",
+      [](const py::object& self) {
+        const auto& creases = self.cast<const Mesh&>().tags.creases;
+        return shown(creases.empty() ? nullptr : &creases[0].sharpness, {static_cast<py::ssize_t>(creases.size())},
+                     self, false, {kCreaseRecordBytes});
+      },
+      "Refinements each crease stays sharp for: (n,) float64; from 10 on for ever. A view.");
+  type.def_property_readonly(
+      "corners",
+      [](const py::object& self) {
+        const auto& corners = self.cast<const Mesh&>().tags.corners;
+        return shown(corners.empty() ? nullptr : &corners[0].vertex, {static_cast<py::ssize_t>(corners.size())}, self,
+                     false, {kCornerRecordBytes});
+      },
+      "Boundary points kept in their place: (n,) int32. A view.");
+  type.def_property_readonly(
+      "corner_sharpness",
+      [](const py::object& self) {
+        const auto& corners = self.cast<const Mesh&>().tags.corners;
+        return shown(corners.empty() ? nullptr : &corners[0].sharpness, {static_cast<py::ssize_t>(corners.size())},
+                     self, false, {kCornerRecordBytes});
+      },
+      "As crease_sharpness, of the corners: (n,) float64. A view.");
 }
 
 // --- Volume meshes --------------------------------------------------------------------------------------------------
@@ -185,13 +197,14 @@ What is wrong with a mesh is told by `check`; InputError here only for arrays th
 --
 
 Takes the arrays named above.)");
-  type.def_property_readonly("points", [](const py::object& self) {
-    return shown_points(self.cast<const VolumeMesh&>().positions, self);
-  }, "(n, 3) float64. A view that can be written.");
+  type.def_property_readonly(
+      "points", [](const py::object& self) { return shown_points(self.cast<const VolumeMesh&>().positions, self); },
+      "(n, 3) float64. A view that can be written.");
   for (const auto& [kind, plural] : kCellKindNames)
-    type.def_property_readonly(plural, [k = kind](const py::object& self) { return cells_of(self, k); },
-                               "Point numbers of the cells of this kind: int32, one row for each. A view where these "
-                               "cells follow one another.");
+    type.def_property_readonly(
+        plural, [k = kind](const py::object& self) { return cells_of(self, k); },
+        "Point numbers of the cells of this kind: int32, one row for each. A view where these "
+        "cells follow one another.");
   type.def_property_readonly(
       "kinds",
       [](const py::object& self) {
@@ -200,28 +213,37 @@ Takes the arrays named above.)");
                      self);
       },
       "Kind of each cell: (n,) uint8, TET, PRISM, HEX or PYRAMID. A view.");
-  type.def_property_readonly("cell_points", [](const py::object& self) {
-    const auto& points = self.cast<const VolumeMesh&>().cell_vertices;
-    return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
-  }, "Point numbers of all cells, one after another: int32. A view.");
-  type.def_property_readonly("cell_offsets", [](const py::object& self) {
-    return shown_offsets(self.cast<const VolumeMesh&>().cell_offsets, self);
-  }, "Where each cell begins in cell_points, and the end: (n + 1,) int64. A view.");
-  type.def_property_readonly("references", [](const py::object& self) {
-    const auto& references = self.cast<const VolumeMesh&>().references;
-    return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
-  }, "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
+  type.def_property_readonly(
+      "cell_points",
+      [](const py::object& self) {
+        const auto& points = self.cast<const VolumeMesh&>().cell_vertices;
+        return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
+      },
+      "Point numbers of all cells, one after another: int32. A view.");
+  type.def_property_readonly(
+      "cell_offsets",
+      [](const py::object& self) { return shown_offsets(self.cast<const VolumeMesh&>().cell_offsets, self); },
+      "Where each cell begins in cell_points, and the end: (n + 1,) int64. A view.");
+  type.def_property_readonly(
+      "references",
+      [](const py::object& self) {
+        const auto& references = self.cast<const VolumeMesh&>().references;
+        return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
+      },
+      "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
   add_tags(type);
   add_groups(type);
-  type.def_property_readonly("region_names", [](const VolumeMesh& mesh) { return region_names(mesh.regions); },
-                             "Names of references: dict of number and name.");
-  type.def_property_readonly("regions", [](const VolumeMesh& mesh) {
-    return to_python(cli::regions_json(measure_regions(mesh, nullptr)));
-  }, "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
+  type.def_property_readonly(
+      "region_names", [](const VolumeMesh& mesh) { return region_names(mesh.regions); },
+      "Names of references: dict of number and name.");
+  type.def_property_readonly(
+      "regions", [](const VolumeMesh& mesh) { return to_python(cli::regions_json(measure_regions(mesh, nullptr))); },
+      "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
   type.def("boundary", &cli::tagged_polygons,
            "boundary($self)\n--\n\nThe boundary as it stands: a SurfaceMesh with the mesh's tags.");
-  type.def("copy", [](const VolumeMesh& mesh) { return std::make_shared<VolumeMesh>(mesh); },
-           "copy($self)\n--\n\nA mesh of its own with the same content.");
+  type.def(
+      "copy", [](const VolumeMesh& mesh) { return std::make_shared<VolumeMesh>(mesh); },
+      "copy($self)\n--\n\nA mesh of its own with the same content.");
   type.def("__repr__", &volume_text);
 }
 
@@ -290,7 +312,8 @@ py::array faces_of(const py::object& self, std::size_t corners) {
 }
 
 void add_surface_mesh(py::module_& module) {
-  py::class_<SurfaceMesh, std::shared_ptr<SurfaceMesh>> type(module, "SurfaceMesh",
+  py::class_<SurfaceMesh, std::shared_ptr<SurfaceMesh>> type(
+      module, "SurfaceMesh",
       R"(A surface of triangles, quads and larger polygons: closed or not, a soup or not.
 
 points        (n, 3) numbers
@@ -307,39 +330,56 @@ Tags and arrays as of VolumeMesh.)");
 --
 
 Takes the arrays named above.)");
-  type.def_property_readonly("points", [](const py::object& self) {
-    return shown_points(self.cast<const SurfaceMesh&>().polygons.positions, self);
-  }, "(n, 3) float64. A view that can be written.");
-  type.def_property_readonly("triangles", [](const py::object& self) { return faces_of(self, 3); },
-                             "Point numbers of the faces of three corners: (n, 3) int32. A view where these follow one "
-                             "another.");
-  type.def_property_readonly("quads", [](const py::object& self) { return faces_of(self, 4); },
-                             "Point numbers of the faces of four corners: (n, 4) int32. A view where these follow one "
-                             "another.");
-  type.def_property_readonly("face_points", [](const py::object& self) {
-    const auto& points = self.cast<const SurfaceMesh&>().polygons.face_vertices;
-    return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
-  }, "Point numbers of all faces, one after another: int32. A view.");
-  type.def_property_readonly("face_offsets", [](const py::object& self) {
-    return shown_offsets(self.cast<const SurfaceMesh&>().polygons.face_offsets, self);
-  }, "Where each face begins in face_points, and the end: (n + 1,) int64. A view.");
+  type.def_property_readonly(
+      "points",
+      [](const py::object& self) { return shown_points(self.cast<const SurfaceMesh&>().polygons.positions, self); },
+      "(n, 3) float64. A view that can be written.");
+  type.def_property_readonly(
+      "triangles", [](const py::object& self) { return faces_of(self, 3); },
+      "Point numbers of the faces of three corners: (n, 3) int32. A view where these follow one "
+      "another.");
+  type.def_property_readonly(
+      "quads", [](const py::object& self) { return faces_of(self, 4); },
+      "Point numbers of the faces of four corners: (n, 4) int32. A view where these follow one "
+      "another.");
+  type.def_property_readonly(
+      "face_points",
+      [](const py::object& self) {
+        const auto& points = self.cast<const SurfaceMesh&>().polygons.face_vertices;
+        return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
+      },
+      "Point numbers of all faces, one after another: int32. A view.");
+  type.def_property_readonly(
+      "face_offsets",
+      [](const py::object& self) { return shown_offsets(self.cast<const SurfaceMesh&>().polygons.face_offsets, self); },
+      "Where each face begins in face_points, and the end: (n + 1,) int64. A view.");
   add_tags(type);
-  type.def_property_readonly("group_names", [](const SurfaceMesh& mesh) {
-    return names_of(mesh.polygons.face_groups.groups);
-  }, kNamesHelp);
-  type.def_property_readonly("group_numbers", [](const py::object& self) {
-    return numbers_of(self.cast<const SurfaceMesh&>().polygons.face_groups.groups, self);
-  }, kNumbersHelp);
-  type.def_property_readonly("face_groups", [](const py::object& self) {
-    const auto& places = self.cast<const SurfaceMesh&>().polygons.face_groups.of_face;
-    return shown(places.data(), {static_cast<py::ssize_t>(places.size())}, self);
-  }, "Place of each face's group in group_names, -1 for none: (n,) int32; without entries where there are no groups. A "
-     "view.");
-  type.def("triangulated", [](const SurfaceMesh& mesh) {
-    return SurfaceMesh{as_polygons(triangulate(mesh.polygons)), mesh.tags};
-  }, "triangulated($self)\n--\n\nThe same with larger faces cut into triangles.");
-  type.def("copy", [](const SurfaceMesh& mesh) { return mesh; },
-           "copy($self)\n--\n\nA surface of its own with the same content.");
+  type.def_property_readonly(
+      "group_names", [](const SurfaceMesh& mesh) { return names_of(mesh.polygons.face_groups.groups); }, kNamesHelp);
+  type.def_property_readonly(
+      "group_numbers",
+      [](const py::object& self) {
+        return numbers_of(self.cast<const SurfaceMesh&>().polygons.face_groups.groups, self);
+      },
+      kNumbersHelp);
+  type.def_property_readonly(
+      "face_groups",
+      [](const py::object& self) {
+        const auto& places = self.cast<const SurfaceMesh&>().polygons.face_groups.of_face;
+        return shown(places.data(), {static_cast<py::ssize_t>(places.size())}, self);
+      },
+      "Place of each face's group in group_names, -1 for none: (n,) int32; without entries where there are no groups. "
+      "A "
+      "view.");
+  type.def(
+      "triangulated",
+      [](const SurfaceMesh& mesh) {
+        return SurfaceMesh{as_polygons(triangulate(mesh.polygons)), mesh.tags};
+      },
+      "triangulated($self)\n--\n\nThe same with larger faces cut into triangles.");
+  type.def(
+      "copy", [](const SurfaceMesh& mesh) { return mesh; },
+      "copy($self)\n--\n\nA surface of its own with the same content.");
   type.def("__repr__", [](const SurfaceMesh& mesh) {
     return "<subvol.SurfaceMesh: " + std::to_string(mesh.polygons.positions.size()) + " points, " +
            std::to_string(mesh.polygons.num_faces()) + " faces>";
@@ -389,16 +429,14 @@ std::shared_ptr<const VolumeMesh> valid_volume_from(const py::object& object, co
 
 TriangleMesh triangles_from(const py::object& object, const char* name) {
   if (!is_path(object)) return triangulate(surface_from(object, name).polygons);
-  return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
-    return cli::load_surface(path, warnings);
-  });
+  return read_with_warnings(
+      [path = path_from(object)](std::vector<std::string>& warnings) { return cli::load_surface(path, warnings); });
 }
 
 cli::Target target_from(const py::object& object, const char* name) {
   if (is_path(object))
-    return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
-      return cli::load_target(path, warnings);
-    });
+    return read_with_warnings(
+        [path = path_from(object)](std::vector<std::string>& warnings) { return cli::load_target(path, warnings); });
   const bool is_mesh = py::isinstance<SurfaceMesh>(object) || py::isinstance<VolumeMesh>(object);
   if (is_mesh || !(py::isinstance<py::sequence>(object) || py::hasattr(object, "__array__")))
     return triangles_from(object, name);

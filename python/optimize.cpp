@@ -55,15 +55,9 @@ class Optimization {
                       {"quality", cli::quality_json(before)}};
     if (target_) json_["input"]["target"] = cli::describe("", *target_);
     switch (kind_) {
-      case Kind::linear:
-        optimize(*result);
-        break;
-      case Kind::curved:
-        optimize_curved_cells(*result);
-        break;
-      case Kind::curve:
-        curve(*result);
-        break;
+      case Kind::linear: optimize(*result); break;
+      case Kind::curved: optimize_curved_cells(*result); break;
+      case Kind::curve: curve(*result); break;
     }
     result->report = make_report("optimize", json_, keywords_, work_, warnings_);
     return result;
@@ -121,8 +115,7 @@ class Optimization {
       return optimize_mesh(*mesh_, target, options_);
     });
     const MeshCheck checked = work_.run("check", [&] {
-      const TriangleMesh surface =
-          target_ ? *target_ : fan_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
+      const TriangleMesh surface = target_ ? *target_ : fan_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
       return check_mesh(found.mesh, &surface);
     });
     add(found.report, checked);

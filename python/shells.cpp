@@ -124,10 +124,10 @@ class Growing {
   void plan_layers() {
     if (!options_.vertex_thickness.empty())
       throw InputError("shell: first_height goes with one thickness, not with one for each point");
-    const cli::LayerPlan plan = cli::planned_layers(
-        options_.thickness, cli::parse_length("first_height", first_height_, diagonal_),
-        keywords_.has("layers") ? std::optional(options_.layers) : std::nullopt,
-        keywords_.has("growth") ? std::optional(options_.growth) : std::nullopt);
+    const cli::LayerPlan plan =
+        cli::planned_layers(options_.thickness, cli::parse_length("first_height", first_height_, diagonal_),
+                            keywords_.has("layers") ? std::optional(options_.layers) : std::nullopt,
+                            keywords_.has("growth") ? std::optional(options_.growth) : std::nullopt);
     options_.layers = plan.layers;
     options_.growth = plan.growth;
   }
@@ -194,7 +194,7 @@ std::shared_ptr<VolumeMesh> linear_mesh(const std::shared_ptr<Shelled>& result) 
 }
 
 /// One number per point and side, as (2, n), the inside first.
-auto by_side(std::vector<double> ShellResult::* values) {
+auto by_side(std::vector<double> ShellResult::*values) {
   return [values](const py::object& self) {
     const ShellResult& shell = self.cast<const Shelled&>().shell;
     return shown((shell.*values).data(), {2, static_cast<py::ssize_t>(shell.layers.num_columns())}, self);
@@ -231,20 +231,28 @@ max_iterations, time_limit, chord, progress and threads as of `fit`.)";
 }  // namespace
 
 void add_shell(py::module_& module) {
-  py::class_<Shelled, Reported, std::shared_ptr<Shelled>> type(module, "ShellResult",
+  py::class_<Shelled, Reported, std::shared_ptr<Shelled>> type(
+      module, "ShellResult",
       "What `shell` returns. Point s n + i of the cells is point i of the surface on sheet s, of n points and from the "
       "innermost sheet. The surface is the given one without the patches that were left out, and after its repair: "
       "`surface`.");
-  type.def_property_readonly("surface", [](const Shelled& result) {
-    return SurfaceMesh{result.shell.layers.surface, {}};
-  }, "The surface that the layers stand on: SurfaceMesh.");
-  type.def_property_readonly("mesh", [](const std::shared_ptr<Shelled>& result) {
-    return result->curved ? py::cast(result->curved) : py::cast(linear_mesh(result));
-  }, "The layers, a VolumeMesh whose references number them from the innermost; or curved cells, a HighOrderMesh.");
+  type.def_property_readonly(
+      "surface",
+      [](const Shelled& result) {
+        return SurfaceMesh{result.shell.layers.surface, {}};
+      },
+      "The surface that the layers stand on: SurfaceMesh.");
+  type.def_property_readonly(
+      "mesh",
+      [](const std::shared_ptr<Shelled>& result) {
+        return result->curved ? py::cast(result->curved) : py::cast(linear_mesh(result));
+      },
+      "The layers, a VolumeMesh whose references number them from the innermost; or curved cells, a HighOrderMesh.");
   type.def_property_readonly("linear_mesh", &linear_mesh,
                              "The layers with straight cells, also where they were curved: VolumeMesh.");
-  type.def_property_readonly("inside_layers", [](const Shelled& result) { return result.shell.layers.inside; },
-                             "Layers on the inside: the surface itself is the sheet of this number.");
+  type.def_property_readonly(
+      "inside_layers", [](const Shelled& result) { return result.shell.layers.inside; },
+      "Layers on the inside: the surface itself is the sheet of this number.");
   type.def_property_readonly("thickness", by_side(&ShellResult::achieved),
                              "Length of the columns on the inside and the outside of each point: (2, n). A view.");
   type.def_property_readonly("thickness_asked", by_side(&ShellResult::asked), "What was asked for: (2, n). A view.");

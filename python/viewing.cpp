@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/runs/report_plots.h"
 #include "cli/runs/viewing.h"
+#include "cli/runs/report_plots.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
 #include "python/module.h"

@@ -54,9 +54,8 @@ VolumeMesh star(int blocks) {
           mesh.add_cell(CellKind::hex,
                         std::array<Index, 8>{vertex(block, i, j, k), vertex(block, i + 1, j, k),
                                              vertex(block, i + 1, j + 1, k), vertex(block, i, j + 1, k),
-                                             vertex(block, i, j, k + 1),
-                                             vertex(block, i + 1, j, k + 1), vertex(block, i + 1, j + 1, k + 1),
-                                             vertex(block, i, j + 1, k + 1)});
+                                             vertex(block, i, j, k + 1), vertex(block, i + 1, j, k + 1),
+                                             vertex(block, i + 1, j + 1, k + 1), vertex(block, i, j + 1, k + 1)});
   return mesh;
 }
 

@@ -2,13 +2,13 @@
 // Fits a ring of 60 hexes to noisy points on a bumpy torus: a subdivision volume and curved elements, seen beside the
 // surface that the points were taken from.
 
-#include "samples/shapes.h"
-#include "subvol/base/atomic_file.h"
 #include <subvol/export/export.h>
 #include <subvol/export/gltf_writer.h>
 #include <subvol/fit/elements/boundary_samples.h>
 #include <subvol/fit/high_order_fit.h>
 #include <subvol/fit/mesh_check.h>
+#include "samples/shapes.h"
+#include "subvol/base/atomic_file.h"
 
 #include <cstdio>
 #include <exception>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fits a ring of 60 hexes to a bumpy torus and writes the cage, the finest mesh and what a DCC tool opens.
 
-#include "samples/shapes.h"
 #include <subvol/export/export.h>
 #include <subvol/export/gltf_writer.h>
 #include <subvol/fit/quality/quality.h>
 #include <subvol/fit/subdivision_fit.h>
 #include <subvol/io/mesh_io.h>
+#include "samples/shapes.h"
 
 #include <cstdio>
 #include <exception>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Grows two layers of hexes on either side of a bowl and writes the cells and what a DCC tool opens.
 
-#include "samples/shapes.h"
 #include <subvol/export/export.h>
 #include <subvol/export/gltf_writer.h>
 #include <subvol/io/mesh_io.h>
 #include <subvol/shell/shell.h>
+#include "samples/shapes.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes a template by hand, step by step (grid, carve, pillow), fits it, and lets one be made automatically.
 
-#include "samples/shapes.h"
 #include <subvol/fit/quality/quality.h>
 #include <subvol/fit/subdivision_fit.h>
 #include <subvol/io/mesh_io.h>
@@ -9,6 +8,7 @@
 #include <subvol/templates/carve.h>
 #include <subvol/templates/pillow.h>
 #include <subvol/templates/voxel_grid.h>
+#include "samples/shapes.h"
 
 #include <cstdio>
 #include <exception>

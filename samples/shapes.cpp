@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "samples/shapes.h"
 
-#include "subvol/subdivision/repeated_subdivision.h"
 #include <subvol/mesh/features.h>
 #include <subvol/mesh/mesh_topology.h>
 #include <subvol/surface/boundary.h>
+#include "subvol/subdivision/repeated_subdivision.h"
 
 #include <Eigen/Geometry>
 

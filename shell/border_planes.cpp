@@ -194,8 +194,10 @@ ColumnPlanes::ColumnPlanes(std::vector<BorderPlane> planes, std::size_t num_colu
   for (std::size_t p = 0; p < planes_.size(); ++p)
     for (const Index v : planes_[p].vertices) {
       auto& [first, second] = of_column_[v];
-      if (first == kNoIndex) first = static_cast<Index>(p);
-      else if (second == kNoIndex) second = static_cast<Index>(p);
+      if (first == kNoIndex)
+        first = static_cast<Index>(p);
+      else if (second == kNoIndex)
+        second = static_cast<Index>(p);
     }
 }
 

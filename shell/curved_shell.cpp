@@ -143,8 +143,7 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
   }
   const std::vector<int> points(mesh.space.num_cells(),
                                 std::max(kLeastDistortionPoints, points_for_order(mesh.space.max_order())));
-  auto energy =
-      std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
+  auto energy = std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
   energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others
   SparseMap samples = select_rows(nodes, {});
   FitProblem problem(std::move(nodes), std::move(samples), std::move(energy), nullptr, 1);
@@ -214,7 +213,10 @@ BoundarySamples sheet_samples(const ShellLayers& layers, const ElementSpace& spa
 CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unchecked) {
   const CurvedShellOptions options = checked(shell, unchecked);
   CurvedShell curved{.mesh = HighOrderMesh(ElementSpace(shell.mesh, options.basis, options.order), shell.mesh),
-                     .quality = {}, .intersecting_faces = {}, .thickness = {}, .report = {}};
+                     .quality = {},
+                     .intersecting_faces = {},
+                     .thickness = {},
+                     .report = {}};
   const ElementSpace& space = curved.mesh.space;
   const NodeStrands strands = node_strands(shell.layers, space);
   const std::vector<Vec3> straight = curved.mesh.coefficients;
@@ -236,7 +238,8 @@ CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unch
     curved.report.stop_reason = is_late() ? StopReason::time_limit : StopReason::cancelled;
     curved.report.explanation = "ended before the curved cells were checked; they are straight";
   } else if (held > 0) {
-    curved.report.warnings.push_back(std::to_string(held) + " columns are curved less than the solve had them: there "
+    curved.report.warnings.push_back(std::to_string(held) +
+                                     " columns are curved less than the solve had them: there "
                                      "faces met or cells were not certified");
   }
   curved.quality = measure_quality(curved.mesh, 0, shell_reference(shell.layers, shell.limited));

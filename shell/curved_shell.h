@@ -27,14 +27,14 @@ struct CurvedShellOptions {
 
 /// A shell of curved cells, in the unit of the linear one, and its properties.
 struct CurvedShell {
-  HighOrderMesh mesh;      ///< vertices, cells and references as in `ShellResult::mesh`
-  QualityReport quality;   ///< relative to `shell_reference(layers, limited)`; includes the certificate
+  HighOrderMesh mesh;     ///< vertices, cells and references as in `ShellResult::mesh`
+  QualityReport quality;  ///< relative to `shell_reference(layers, limited)`; includes the certificate
   /// Pairs of boundary faces whose triangles (see the options) intersect, as positions in
   /// `MeshTopology::boundary_faces()`. A face with a degenerate triangle, or whose own triangles intersect, is paired
   /// with itself.
   std::vector<std::array<Index, 2>> intersecting_faces;
   MeasuredThickness thickness;
-  FitReport report;        ///< of this solve only
+  FitReport report;  ///< of this solve only
   bool valid() const { return quality.certificate.all_certified() && intersecting_faces.empty(); }
 };
 

@@ -11,12 +11,12 @@ namespace subvol {
 
 /// Options of `extrude`.
 struct ExtrudeOptions {
-  double thickness = 0;            ///< length of the columns, in the surface's unit, > 0
-  int layers = 1;                  ///< >= 1
-  double growth = 1;               ///< ratio of each layer's thickness to that of the layer below, > 0
+  double thickness = 0;  ///< length of the columns, in the surface's unit, > 0
+  int layers = 1;        ///< >= 1
+  double growth = 1;     ///< ratio of each layer's thickness to that of the layer below, > 0
   /// Direction of all columns, of any length; empty: along the surface's normals (`visible_normals`).
   std::optional<Vec3> direction;
-  FeatureTags tags;                ///< tags of the surface, repeated on both ends
+  FeatureTags tags;  ///< tags of the surface, repeated on both ends
 };
 
 /// Stacks layers of cells on a surface in straight columns: hexes on quads, prisms on triangles. This is for templates;

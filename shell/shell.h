@@ -25,11 +25,11 @@ struct ShellOptions {
   std::vector<double> vertex_thickness;  ///< thickness at each vertex, > 0; empty: `thickness` everywhere
   ShellSide side = ShellSide::outward;   ///< outward: in the direction of the faces' normals
   int layers = 1;                        ///< on each side, >= 1
-  double growth = 1;  ///< ratio of each layer's thickness to that of the next one nearer the surface, > 0
-  bool optimize = true;                  ///< false: straight columns without a solve
+  double growth = 1;     ///< ratio of each layer's thickness to that of the next one nearer the surface, > 0
+  bool optimize = true;  ///< false: straight columns without a solve
   /// Lets the surface's own vertices slide along it if that helps the cells; those of its border and tags stay fixed.
   bool free_surface = false;
-  FeatureTags tags;                      ///< tags of the surface, repeated on the outer sheets
+  FeatureTags tags;  ///< tags of the surface, repeated on the outer sheets
   /// Planes in which columns on the border stay; `without_faces` returns those of patches that were left out. The flat
   /// parts of the rest of the border are found (`flat_border_planes`).
   std::vector<BorderPlane> border_planes;
@@ -44,10 +44,10 @@ struct ShellResult {
   ShellLayers layers;
   /// Layer by layer; references number the layers, from 1 for the innermost; face groups are those of `shell_groups`.
   VolumeMesh mesh;
-  std::vector<double> asked;       ///< the requested thickness
-  std::vector<double> limited;     ///< the thickness that there is room for, used in the cells' references
-  std::vector<double> achieved;    ///< distance between a column's end and its surface vertex
-  std::vector<double> clearance;   ///< distance between a column's end and the whole given surface
+  std::vector<double> asked;      ///< the requested thickness
+  std::vector<double> limited;    ///< the thickness that there is room for, used in the cells' references
+  std::vector<double> achieved;   ///< distance between a column's end and its surface vertex
+  std::vector<double> clearance;  ///< distance between a column's end and the whole given surface
   /// Largest distance of the sheet's vertices from the given surface, if they were free.
   double surface_distance_max = 0;
   QualityReport quality;           ///< relative to `shell_reference(layers, limited)`

@@ -51,8 +51,7 @@ void require_faces(const PolygonMesh& surface, const SurfaceNames& names) {
     throw InputError(to_text(faults, surface, names));
   }
   const auto unused = std::find(used.begin(), used.end(), 0);
-  if (unused != used.end())
-    throw InputError("vertex " + std::to_string(unused - used.begin()) + " belongs to no face");
+  if (unused != used.end()) throw InputError("vertex " + std::to_string(unused - used.begin()) + " belongs to no face");
 }
 
 /// Adds the cell of a face in one layer.
@@ -110,7 +109,8 @@ double growth_of_layers(double thickness, double first_height, int num_layers) {
                      std::to_string(num_layers - 1) + " more within a thickness of " + text(thickness));
   if (!(sum(high) >= thickness))
     throw InputError("shell: " + std::to_string(num_layers) + " layers, the first " + text(first_height) +
-                     " high, do not reach a thickness of " + text(thickness) + " even if each is 100 times as thick as "
+                     " high, do not reach a thickness of " + text(thickness) +
+                     " even if each is 100 times as thick as "
                      "the one before; ask for more layers");
   for (int i = 0; i < 200 && low < high; ++i) {
     const double growth = std::sqrt(low * high);
@@ -124,8 +124,8 @@ int number_of_layers(double thickness, double first_height, double growth) {
   if (!(thickness > 0) || !(first_height > 0) || !(growth > 0) || !std::isfinite(thickness))
     throw InputError("shell: thickness, first height and growth must be positive");
   if (first_height > thickness)
-    throw InputError(formatted("shell: the first layer, %.6g high, is thicker than the shell, %.6g", first_height,
-                               thickness));
+    throw InputError(
+        formatted("shell: the first layer, %.6g high, is thicker than the shell, %.6g", first_height, thickness));
   double total = 0, height = first_height;
   for (int k = 1; k <= kMostLayers; ++k, height *= growth) {
     const double before = total;
@@ -133,8 +133,10 @@ int number_of_layers(double thickness, double first_height, double growth) {
     if (total < thickness) continue;
     return k > 1 && thickness - before < total - thickness ? k - 1 : k;
   }
-  throw InputError(formatted("shell: layers that begin with a height of %.6g and grow by %.6g reach %.6g at most, not "
-                             "the thickness of %.6g", first_height, growth, total, thickness));
+  throw InputError(
+      formatted("shell: layers that begin with a height of %.6g and grow by %.6g reach %.6g at most, not "
+                "the thickness of %.6g",
+                first_height, growth, total, thickness));
 }
 
 void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,

@@ -32,12 +32,12 @@ namespace subvol {
 ///
 /// Thicknesses are arrays of one number per strand: [inside, by column][outside, by column].
 struct ShellLayers {
-  PolygonMesh surface;             ///< triangles and quads; every vertex is used
-  SurfaceTopology topology;        ///< of the surface
-  int inside = 0, outside = 0;     ///< number of layers on each side of the surface; at least one in total
+  PolygonMesh surface;          ///< triangles and quads; every vertex is used
+  SurfaceTopology topology;     ///< of the surface
+  int inside = 0, outside = 0;  ///< number of layers on each side of the surface; at least one in total
   /// Share of a side's thickness that its first k layers occupy, counted from the surface: 0 .. 1.
   std::vector<double> inside_shares, outside_shares;
-  ColumnPlanes planes;             ///< those in which columns on the border stay; none unless they are set
+  ColumnPlanes planes;  ///< those in which columns on the border stay; none unless they are set
 
   std::size_t num_columns() const { return surface.positions.size(); }
   int num_sheets() const { return inside + outside + 1; }

@@ -45,9 +45,9 @@ double distance_from_planes(const ShellLayers& layers, std::span<const Vec3> pos
 
 /// The actual thickness of a shell, in the surface's unit.
 struct MeasuredThickness {
-  std::vector<double> achieved;    ///< per strand: distance of its end from the surface vertex of its column
-  std::vector<double> clearance;   ///< per strand: distance of its end from the surface of `layers`
-  double surface_distance_max = 0; ///< of the vertices of sheet `inside` from the surface of `layers`
+  std::vector<double> achieved;     ///< per strand: distance of its end from the surface vertex of its column
+  std::vector<double> clearance;    ///< per strand: distance of its end from the surface of `layers`
+  double surface_distance_max = 0;  ///< of the vertices of sheet `inside` from the surface of `layers`
 };
 
 /// positions  one per vertex of the shell. Strands on a side without layers get 0. `triangulate` cuts the quads.

@@ -25,8 +25,8 @@ std::uint64_t id_hash(std::string_view id) {
 Shard parse_shard(const std::string& text) {
   const std::size_t slash = text.find('/');
   const auto number = parse_integer(std::string_view(text).substr(0, slash));
-  const auto count = slash == std::string::npos ? std::nullopt
-                                                : parse_integer(std::string_view(text).substr(slash + 1));
+  const auto count =
+      slash == std::string::npos ? std::nullopt : parse_integer(std::string_view(text).substr(slash + 1));
   constexpr std::int64_t kMostShards = 1000000;
   if (!number || !count || *count < 1 || *count > kMostShards || *number < 1 || *number > *count)
     throw UsageError("--shard: expected a number and a count as 3/8, the number from 1 to the count, not " + text);

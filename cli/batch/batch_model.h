@@ -29,8 +29,8 @@ struct BatchManifest {
 
 /// Properties of a verb that a batch needs.
 struct BatchVerb {
-  std::vector<std::string> words;                 ///< {"template", "auto"}
-  std::set<std::string, std::less<>> options;     ///< long names, with their hyphens
+  std::vector<std::string> words;              ///< {"template", "auto"}
+  std::set<std::string, std::less<>> options;  ///< long names, with their hyphens
   bool has(std::string_view option) const { return options.count(option) > 0; }
 };
 

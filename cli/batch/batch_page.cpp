@@ -70,7 +70,8 @@ std::string failures(const BatchSummary& summary, const Link& link) {
       rows += row({linked_id(model, link), escaped(model.reason)});
     }
     if (rows.empty()) continue;
-    text += table({name_of(static_cast<Outcome>(i)).data(), "reason"}, rows) + left_out(summary.counts[i], kMostReasons);
+    text +=
+        table({name_of(static_cast<Outcome>(i)).data(), "reason"}, rows) + left_out(summary.counts[i], kMostReasons);
   }
   return text;
 }
@@ -110,7 +111,8 @@ std::string gallery(const BatchSummary& summary, const std::vector<ShownModel>& 
   std::string text;
   for (const ShownModel& shown : worst) {
     const ModelFigures& model = summary.models[shown.model];
-    const std::string caption = linked_id(model, link) + formatted(": least scaled Jacobian %.4g", model.figures[kMinQuality]);
+    const std::string caption =
+        linked_id(model, link) + formatted(": least scaled Jacobian %.4g", model.figures[kMinQuality]);
     text += shown.png.empty() ? "<figure><figcaption>" + caption + "; no picture</figcaption></figure>\n"
                               : picture_figure(shown.title, shown.png, caption);
   }
@@ -138,8 +140,8 @@ std::string comparison_text(const PageComparison& page, const BatchSummary& now,
   std::string text = "<p>Compared with " + escaped(page.name) + formatted(": %zu models in both", found.num_common);
   if (found.num_only_before > 0) text += formatted(", %zu only there", found.num_only_before);
   if (found.num_only_now > 0) text += formatted(", %zu only here", found.num_only_now);
-  text += formatted(". %zu fail that did not; %zu do not fail any more.</p>\n", found.failing.size(),
-                    found.mended.size());
+  text +=
+      formatted(". %zu fail that did not; %zu do not fail any more.</p>\n", found.failing.size(), found.mended.size());
   const auto list = [&](const char* title, const std::vector<Compared>& pairs, const auto& value) {
     std::string rows;
     for (std::size_t i = 0; i < std::min(pairs.size(), kMostBatchPageRows); ++i) {

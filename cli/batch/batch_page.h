@@ -11,9 +11,9 @@ namespace subvol::cli {
 
 /// A model that is shown with a picture.
 struct ShownModel {
-  std::size_t model;   ///< number in the summary
-  std::string title;   ///< plain text
-  std::string png;     ///< empty: there is no picture
+  std::size_t model;  ///< number in the summary
+  std::string title;  ///< plain text
+  std::string png;    ///< empty: there is no picture
 };
 
 /// A comparison with an earlier batch.

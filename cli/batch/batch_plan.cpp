@@ -59,7 +59,8 @@ std::vector<std::uint32_t> BatchPlan::pending(FileHasher& hasher,
   constexpr std::size_t kTellingInterval = 1024;  // models
   std::vector<std::uint32_t> models;
   for (std::size_t i = 0; i < manifest_.models.size(); ++i) {
-    if (i % kTellingInterval == 0 && !progress(static_cast<double>(i) / static_cast<double>(seen_.size()))) return models;
+    if (i % kTellingInterval == 0 && !progress(static_cast<double>(i) / static_cast<double>(seen_.size())))
+      return models;
     const BatchModel& model = manifest_.models[i];
     const Seen& seen = seen_[i];
     if (options_.shard.count > 1 && !options_.shard.holds(model.id)) continue;

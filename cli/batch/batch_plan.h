@@ -18,10 +18,10 @@ namespace subvol::cli {
 /// Which models to run.
 struct PlanOptions {
   Shard shard;
-  bool force = false;                ///< also those with a record of the same work
-  bool only_failed = false;          ///< only those whose last record is a failure
-  std::optional<Outcome> only;       ///< only those whose last record has this outcome
-  std::string program;               ///< as given; empty: subvol itself
+  bool force = false;           ///< also those with a record of the same work
+  bool only_failed = false;     ///< only those whose last record is a failure
+  std::optional<Outcome> only;  ///< only those whose last record has this outcome
+  std::string program;          ///< as given; empty: subvol itself
 };
 
 /// Holds what the last record of each model says, and which models are left to do.

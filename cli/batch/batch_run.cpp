@@ -77,11 +77,11 @@ struct Job {
   std::uint32_t model;
   ModelFiles files;
   ChildProcess process;
-  double started;                    ///< seconds since 1970
-  Clock::time_point end_by;          ///< when to ask it to end, or when to kill it
+  double started;            ///< seconds since 1970
+  Clock::time_point end_by;  ///< when to ask it to end, or when to kill it
   bool was_asked = false, is_timed_out = false;
-  std::optional<ChildEnd> end;       ///< how it ended, if a signal from outside has ended it
-  Clock::time_point judge_at;        ///< when to take that for an end of its own
+  std::optional<ChildEnd> end;  ///< how it ended, if a signal from outside has ended it
+  Clock::time_point judge_at;   ///< when to take that for an end of its own
 };
 
 /// Whoever ends a batch together with its processes (a scheduler that requeues a task) may reach a process first. So a
@@ -107,8 +107,10 @@ class Batch {
     pending_ = plan_.pending(hasher_, [&](double) { return !interrupted(); });
     result_.num_models = plan_.size();
     tell_plan();
-    if (options_.dry_run) print_pending();
-    else run_pending();
+    if (options_.dry_run)
+      print_pending();
+    else
+      run_pending();
     teller_.finish();
     count_outcomes();
     if (options_.print_records) print_records();
@@ -144,9 +146,7 @@ class Batch {
     result_.num_elsewhere = elsewhere_.size();
   }
 
-  bool has_work() {
-    return !jobs_.empty() || (!interrupted() && (next_ < pending_.size() || is_patient()));
-  }
+  bool has_work() { return !jobs_.empty() || (!interrupted() && (next_ < pending_.size() || is_patient())); }
 
   /// True for a while after all else is done, if other processes have claimed models: they may be what a killed batch
   /// has left, and end soon.
@@ -268,8 +268,10 @@ class Batch {
     }
     const Remains remains = remains_of(job, end, model, folder);
     const Verdict verdict = judge(end, remains);
-    if (fs::is_empty(folder)) fs::remove(folder);
-    else publish(folder, options_.folder / "models" / folder_name(model.id));
+    if (fs::is_empty(folder))
+      fs::remove(folder);
+    else
+      publish(folder, options_.folder / "models" / folder_name(model.id));
     fs::remove_all(folder);  // what was published before
     const WorkKey key{options_hash(model, options_.plan.program), job.files.hash, version()};
     records_.append(record_line(model, key, verdict, end, remains, job.files.stamp, job.started));
@@ -332,8 +334,8 @@ class Batch {
   std::vector<std::uint32_t> pending_;
   std::size_t next_ = 0, num_failed_ = 0;
   std::vector<Job> jobs_;
-  std::vector<std::uint32_t> elsewhere_;            ///< models that other processes have claimed
-  std::optional<Clock::time_point> patience_end_;   ///< when to leave these to them
+  std::vector<std::uint32_t> elsewhere_;           ///< models that other processes have claimed
+  std::optional<Clock::time_point> patience_end_;  ///< when to leave these to them
   std::unordered_map<std::uint32_t, Outcome> newest_;
   BatchResult result_;
 };

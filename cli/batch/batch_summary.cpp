@@ -75,10 +75,9 @@ std::vector<std::size_t> worst_models(const BatchSummary& summary, std::size_t m
     if (!std::isnan(summary.models[i].figures[kMinQuality])) models.push_back(i);
   most = std::min(most, models.size());
   const auto quality = [&](std::size_t i) { return summary.models[i].figures[kMinQuality]; };
-  std::partial_sort(models.begin(), models.begin() + static_cast<std::ptrdiff_t>(most), models.end(),
-                    [&](std::size_t a, std::size_t b) {
-                      return quality(a) != quality(b) ? quality(a) < quality(b) : a < b;
-                    });
+  std::partial_sort(
+      models.begin(), models.begin() + static_cast<std::ptrdiff_t>(most), models.end(),
+      [&](std::size_t a, std::size_t b) { return quality(a) != quality(b) ? quality(a) < quality(b) : a < b; });
   models.resize(most);
   return models;
 }
@@ -138,10 +137,10 @@ Json comparison_json(const Comparison& comparison, const BatchSummary& now) {
     for (const Compared& pair : pairs) list.push_back(now.models[pair.now].id);
     return list;
   };
-  return {{"common", comparison.num_common},   {"only_before", comparison.num_only_before},
+  return {{"common", comparison.num_common},     {"only_before", comparison.num_only_before},
           {"only_now", comparison.num_only_now}, {"failing", ids(comparison.failing)},
-          {"mended", ids(comparison.mended)},  {"changed_class", ids(comparison.changed)},
-          {"worse", ids(comparison.worse)},    {"farther", ids(comparison.farther)},
+          {"mended", ids(comparison.mended)},    {"changed_class", ids(comparison.changed)},
+          {"worse", ids(comparison.worse)},      {"farther", ids(comparison.farther)},
           {"slower", ids(comparison.slower)}};
 }
 

@@ -16,15 +16,22 @@ namespace subvol::cli {
 
 /// The figures of models that are summarized.
 enum Figure : std::size_t {
-  kMinQuality, kMeanQuality, kMeanDistance, kMaxDistance, kCells, kWallSeconds, kProcessorSeconds, kPeakMemory,
+  kMinQuality,
+  kMeanQuality,
+  kMeanDistance,
+  kMaxDistance,
+  kCells,
+  kWallSeconds,
+  kProcessorSeconds,
+  kPeakMemory,
   kNumFigures
 };
 struct FigureKind {
-  const char* name;                 ///< of the entry in records
+  const char* name;  ///< of the entry in records
   const char* title;
   double RecordFields::*value;
-  double scale;                     ///< factor for people
-  bool of_results;                  ///< of the models that are no failures; otherwise of all
+  double scale;     ///< factor for people
+  bool of_results;  ///< of the models that are no failures; otherwise of all
 };
 /// In the order of `Figure`.
 std::span<const FigureKind> figure_kinds();
@@ -33,8 +40,8 @@ std::span<const FigureKind> figure_kinds();
 struct ModelFigures {
   std::string id, reason;
   Outcome outcome = Outcome::valid;
-  std::uint32_t folder = 0;                    ///< number of the batch's folder
-  std::array<double, kNumFigures> figures{};   ///< by `Figure`
+  std::uint32_t folder = 0;                   ///< number of the batch's folder
+  std::array<double, kNumFigures> figures{};  ///< by `Figure`
 };
 
 /// Quantiles of a figure: each is a value of a model (the nearest rank).
@@ -49,10 +56,10 @@ Quantiles quantiles_of(std::vector<double> values);
 
 /// The models of one batch, or of several shards with a folder each.
 struct BatchSummary {
-  std::vector<ModelFigures> models;            ///< ordered by id
+  std::vector<ModelFigures> models;  ///< ordered by id
   std::array<std::size_t, kNumOutcomes> counts{};
   std::array<Quantiles, kNumFigures> quantiles{};
-  std::size_t num_damaged = 0;                 ///< lines that are no records
+  std::size_t num_damaged = 0;  ///< lines that are no records
   std::size_t count(Outcome outcome) const { return counts[static_cast<std::size_t>(outcome)]; }
 };
 
@@ -69,12 +76,12 @@ struct Compared {
 
 /// The differences between two batches. Every list is ordered by id.
 struct Comparison {
-  std::vector<Compared> failing;     ///< failures now, and none before
-  std::vector<Compared> mended;      ///< failures before, and none now
-  std::vector<Compared> changed;     ///< failures in both, of another class
-  std::vector<Compared> worse;       ///< a lower least scaled Jacobian, by more than kLowerQuality
-  std::vector<Compared> farther;     ///< a larger mean distance, by more than kFartherShare and kFartherPercent
-  std::vector<Compared> slower;      ///< more processor time, by more than kSlowerShare and kSlowerSeconds
+  std::vector<Compared> failing;  ///< failures now, and none before
+  std::vector<Compared> mended;   ///< failures before, and none now
+  std::vector<Compared> changed;  ///< failures in both, of another class
+  std::vector<Compared> worse;    ///< a lower least scaled Jacobian, by more than kLowerQuality
+  std::vector<Compared> farther;  ///< a larger mean distance, by more than kFartherShare and kFartherPercent
+  std::vector<Compared> slower;   ///< more processor time, by more than kSlowerShare and kSlowerSeconds
   std::size_t num_common = 0, num_only_before = 0, num_only_now = 0;
 
   static constexpr double kLowerQuality = 0.01;

@@ -95,9 +95,14 @@ ChildProcess::ChildProcess(const ChildCommand& command) {
   for (const std::string& word : command.words) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
   const Environment environment(command.environment);
-  Launch launch{.program = program.c_str(), .folder = command.folder.c_str(), .messages = command.messages.c_str(),
-                .words = words.data(), .environment = environment.data(), .memory_limit = command.memory_limit,
-                .signals = {}, .parent = getpid()};
+  Launch launch{.program = program.c_str(),
+                .folder = command.folder.c_str(),
+                .messages = command.messages.c_str(),
+                .words = words.data(),
+                .environment = environment.data(),
+                .memory_limit = command.memory_limit,
+                .signals = {},
+                .parent = getpid()};
   // No handler of this process may run in the new one, which shares its memory.
   sigset_t all, before;
   sigfillset(&all);
@@ -153,8 +158,10 @@ std::optional<ChildEnd> ChildProcess::collect(bool wait) {
   }
   pid_ = 0;
   ChildEnd end;
-  if (WIFEXITED(status)) end.exit_code = WEXITSTATUS(status);
-  else end.signal = WTERMSIG(status);
+  if (WIFEXITED(status))
+    end.exit_code = WEXITSTATUS(status);
+  else
+    end.signal = WTERMSIG(status);
   end.wall_seconds = std::chrono::duration<double>(Clock::now() - start_).count();
   end.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
   end.peak_memory_bytes = static_cast<std::size_t>(usage.ru_maxrss) * 1024;

@@ -14,18 +14,18 @@ namespace subvol::cli {
 
 /// A program to run in a process of its own.
 struct ChildCommand {
-  std::filesystem::path program;           ///< a file, not to be looked up
-  std::vector<std::string> words;          ///< its arguments, without its name
-  std::filesystem::path folder;            ///< the current folder of the process
-  std::string messages;                    ///< file in that folder for its standard output and error
-  std::vector<std::string> environment;    ///< NAME=VALUE, on top of the environment of this process
-  std::size_t memory_limit = 0;            ///< bytes of data that each of its processes may have; 0: no limit
+  std::filesystem::path program;         ///< a file, not to be looked up
+  std::vector<std::string> words;        ///< its arguments, without its name
+  std::filesystem::path folder;          ///< the current folder of the process
+  std::string messages;                  ///< file in that folder for its standard output and error
+  std::vector<std::string> environment;  ///< NAME=VALUE, on top of the environment of this process
+  std::size_t memory_limit = 0;          ///< bytes of data that each of its processes may have; 0: no limit
 };
 
 /// How a process ended, and what it took together with the processes that it waited for.
 struct ChildEnd {
-  int exit_code = -1;            ///< -1: ended by a signal
-  int signal = 0;                ///< 0: none
+  int exit_code = -1;  ///< -1: ended by a signal
+  int signal = 0;      ///< 0: none
   double wall_seconds = 0, cpu_seconds = 0;
   std::size_t peak_memory_bytes = 0;  ///< of the largest process
 };

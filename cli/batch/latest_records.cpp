@@ -54,8 +54,10 @@ LatestRecords::LatestRecords(std::span<const fs::path> folders) {
     // A last line without an end is being written, or was when the machine failed.
     for (std::size_t end; (end = rest.find('\n')) != std::string_view::npos; rest.remove_prefix(end + 1)) {
       const std::string_view line = rest.substr(0, end), id = quoted_id(line);
-      if (!id.empty() && line.ends_with('}')) entries_[id] = {line, i};
-      else if (!line.empty()) ++num_damaged_;
+      if (!id.empty() && line.ends_with('}'))
+        entries_[id] = {line, i};
+      else if (!line.empty())
+        ++num_damaged_;
     }
   }
 }

@@ -78,18 +78,25 @@ class Collector {
   }
 
   BatchModel fresh(std::uint32_t folder) const {
-    return {.id = {}, .verb = defaults_.verb, .input = {}, .options = defaults_.options, .outputs = {}, .folder = folder};
+    return {
+        .id = {}, .verb = defaults_.verb, .input = {}, .options = defaults_.options, .outputs = {}, .folder = folder};
   }
 
   /// Sets what a column or entry of this name says. An empty text and null count as not given.
   static void set(BatchModel& model, const std::string& name, const Json& value) {
     if (name.starts_with('#') || value.is_null() || value == "") return;
-    if (name == "id") model.id = text_of(value, name);
-    else if (name == "verb") model.verb = text_of(value, name);
-    else if (name == "input") model.input = text_of(value, name);
-    else if (name == "outputs") model.outputs = words_of(value, name);
-    else if (name == "options") add_options(model, value);
-    else add_option(model, name, value);
+    if (name == "id")
+      model.id = text_of(value, name);
+    else if (name == "verb")
+      model.verb = text_of(value, name);
+    else if (name == "input")
+      model.input = text_of(value, name);
+    else if (name == "outputs")
+      model.outputs = words_of(value, name);
+    else if (name == "options")
+      add_options(model, value);
+    else
+      add_option(model, name, value);
   }
 
   void add(BatchModel model, Place place) {
@@ -173,8 +180,8 @@ void read_table(const std::string& path, char separator, Collector& all) {
     throw InputError(rows.place() + ": expected a column 'input' among the names of the first line");
   while (rows.next(fields)) {
     if (fields.size() != names.size())
-      throw InputError(rows.place() + ": expected " + std::to_string(names.size()) + " fields as in the first line, got " +
-                       std::to_string(fields.size()));
+      throw InputError(rows.place() + ": expected " + std::to_string(names.size()) +
+                       " fields as in the first line, got " + std::to_string(fields.size()));
     BatchModel model = all.fresh(folder);
     for (std::size_t i = 0; i < names.size(); ++i) {
       try {
@@ -238,10 +245,14 @@ BatchManifest read_manifest(std::span<const std::string> sources, std::span<cons
   const std::uint32_t here = all.add_folder(".");
   for (const std::string& source : sources) {
     const std::string extension = lower_case(fs::path(source).extension().string());
-    if (extension == ".csv") read_table(source, ',', all);
-    else if (extension == ".tsv") read_table(source, '\t', all);
-    else if (extension == ".jsonl" || extension == ".ndjson") read_json_lines(source, all);
-    else add_pattern(source, here, all);
+    if (extension == ".csv")
+      read_table(source, ',', all);
+    else if (extension == ".tsv")
+      read_table(source, '\t', all);
+    else if (extension == ".jsonl" || extension == ".ndjson")
+      read_json_lines(source, all);
+    else
+      add_pattern(source, here, all);
   }
   static const std::string kRow = "--row";
   for (const std::string& row : rows) {

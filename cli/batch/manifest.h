@@ -12,8 +12,8 @@ namespace subvol::cli {
 /// What holds for models that do not say otherwise.
 struct ModelDefaults {
   std::string verb = "fit";
-  std::vector<std::string> options;         ///< come before those of the model
-  std::vector<std::string> outputs{"mesh"}; ///< for verbs that have -o
+  std::vector<std::string> options;          ///< come before those of the model
+  std::vector<std::string> outputs{"mesh"};  ///< for verbs that have -o
 };
 
 /// Reads the models of a batch.

@@ -103,8 +103,10 @@ std::string FileHasher::stamp(const BatchModel& model) const {
   for_each_file(model, folders_[model.folder],
                 [&](std::string_view word, const fs::path&, const std::optional<FileState>& state, bool) {
                   stamps.add(word);
-                  if (state) stamps.add(state->size).add(state->changed);
-                  else stamps.add(kMissing);
+                  if (state)
+                    stamps.add(state->size).add(state->changed);
+                  else
+                    stamps.add(kMissing);
                 });
   return stamps.text();
 }

@@ -40,11 +40,11 @@ std::string_view status_of(Outcome outcome);
 
 /// What a process left behind.
 struct Remains {
-  Json report;                  ///< null if it wrote none
+  Json report;                       ///< null if it wrote none
   std::vector<std::string> outputs;  ///< files that it wrote
-  bool has_outputs = false;     ///< all that it was to write are there
-  bool was_timed_out = false;   ///< the batch ended it because its time was over
-  std::string last_message;     ///< last line on standard output or error, without "subvol: "
+  bool has_outputs = false;          ///< all that it was to write are there
+  bool was_timed_out = false;        ///< the batch ended it because its time was over
+  std::string last_message;          ///< last line on standard output or error, without "subvol: "
 };
 
 /// What became of a model, and why.

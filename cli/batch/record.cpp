@@ -88,11 +88,14 @@ class FieldsHandler : public nlohmann::json_sax<Json> {
   std::string* text_at() {
     if (is_run_) return key_ == "input_stamp" ? &fields_.input_stamp : nullptr;
     if (depth_ != 1) return nullptr;
-    const std::pair<const char*, std::string*> all[] = {
-        {"id", &fields_.id},         {"class", &fields_.outcome},
-        {"reason", &fields_.reason}, {"verb", &fields_.verb},
-        {"input", &fields_.input},   {"options_hash", &fields_.key.options_hash},
-        {"version", &fields_.key.version}, {"input_hash", &fields_.key.input_hash}};
+    const std::pair<const char*, std::string*> all[] = {{"id", &fields_.id},
+                                                        {"class", &fields_.outcome},
+                                                        {"reason", &fields_.reason},
+                                                        {"verb", &fields_.verb},
+                                                        {"input", &fields_.input},
+                                                        {"options_hash", &fields_.key.options_hash},
+                                                        {"version", &fields_.key.version},
+                                                        {"input_hash", &fields_.key.input_hash}};
     for (const auto& [name, text] : all)
       if (key_ == name) return text;
     return nullptr;

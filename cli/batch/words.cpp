@@ -11,8 +11,10 @@ std::vector<std::string> split_words(std::string_view text) {
   char quote = 0;
   for (const char c : text) {
     if (quote != 0) {
-      if (c == quote) quote = 0;
-      else words.back() += c;
+      if (c == quote)
+        quote = 0;
+      else
+        words.back() += c;
       continue;
     }
     if (c == ' ' || c == '\t') {
@@ -21,8 +23,10 @@ std::vector<std::string> split_words(std::string_view text) {
     }
     if (!is_open) words.emplace_back();
     is_open = true;
-    if (c == '\'' || c == '"') quote = c;
-    else words.back() += c;
+    if (c == '\'' || c == '"')
+      quote = c;
+    else
+      words.back() += c;
   }
   if (quote != 0) throw InputError(std::string("expected another ") + quote + " to end what the first one begins");
   return words;

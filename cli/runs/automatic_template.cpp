@@ -24,8 +24,9 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
   if (!source.path.empty()) return {load_volume(source.path, warnings, true, run.references), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   if (options.control.time_limit_seconds > 0 && !run.checkpoint.empty())
-    warnings.push_back("which template is made depends on how far its trials come within --time-limit: a run that "
-                       "--resume's the checkpoint may make another one and be refused; give a --template");
+    warnings.push_back(
+        "which template is made depends on how far its trials come within --time-limit: a run that "
+        "--resume's the checkpoint may make another one and be refused; give a --template");
   ProgressTeller teller(run.progress, run.quiet);
   options.cells = source.cells;
   options.control.progress = [&](const FitProgress& progress) {

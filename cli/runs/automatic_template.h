@@ -12,8 +12,8 @@ namespace subvol::cli {
 
 /// Source of a fit's template.
 struct TemplateSource {
-  std::string path;                   ///< template file; empty: the template is made from the target
-  std::optional<std::size_t> cells;   ///< approximate number of cells, if the template is made
+  std::string path;                  ///< template file; empty: the template is made from the target
+  std::optional<std::size_t> cells;  ///< approximate number of cells, if the template is made
 };
 
 /// A fit's template, and how it was made, if it was.

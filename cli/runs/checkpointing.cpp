@@ -16,9 +16,8 @@ using namespace internal;
 namespace {
 
 /// Options that do not affect the fit's result, and names of inputs, which are identified by their content.
-const std::set<std::string, std::less<>> kNeutralOptions{"chord", "unit",  "up",       "cut",
-                                                           "seed",  "target", "template", "no-wireframe",
-                                                           "quantize"};
+const std::set<std::string, std::less<>> kNeutralOptions{"chord",  "unit",     "up",           "cut",     "seed",
+                                                         "target", "template", "no-wireframe", "quantize"};
 
 std::span<const double> numbers(const std::vector<Vec3>& points) {
   return {points.empty() ? nullptr : points.front().data(), 3 * points.size()};

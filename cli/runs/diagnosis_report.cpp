@@ -233,14 +233,10 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis) {
                                           {"prevents_filling", prevents_filling(finding.fault)},
                                           {"first", std::move(places)}};
   }
-  Json json{{"fillable", diagnosis.is_fillable()},
-            {"triangles", diagnosis.num_triangles},
-            {"vertices", diagnosis.num_vertices},
-            {"diagonal", diagnosis.diagonal},
-            {"volume", diagnosis.volume},
-            {"num_parts", diagnosis.parts.size()},
-            {"parts", parts_json(diagnosis.parts)},
-            {"findings", std::move(findings)}};
+  Json json{{"fillable", diagnosis.is_fillable()},  {"triangles", diagnosis.num_triangles},
+            {"vertices", diagnosis.num_vertices},   {"diagonal", diagnosis.diagonal},
+            {"volume", diagnosis.volume},           {"num_parts", diagnosis.parts.size()},
+            {"parts", parts_json(diagnosis.parts)}, {"findings", std::move(findings)}};
   if (diagnosis.is_cancelled) json["ended_early"] = true;
   return json;
 }
@@ -258,8 +254,10 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
     for (std::size_t i = 1; i < finding.places.size(); ++i) text << place_line(finding.places[i]);
     if (prevents_filling(finding.fault)) reasons += (reasons.empty() ? "" : ", ") + to_string(finding.fault);
   }
-  if (reasons.empty()) text << "can be filled as it is\n";
-  else text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
+  if (reasons.empty())
+    text << "can be filled as it is\n";
+  else
+    text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
   return text.str();
 }
 
@@ -298,9 +296,8 @@ std::string to_text(const FillingForecast& forecast) {
 
 Json filling_json(const FillingForecast& forecast) {
   if (!forecast.refusal.empty()) return {{"refused", as_utf8(forecast.refusal)}};
-  Json json{{"repairs", forecast.repair.done},
-            {"notes", forecast.repair.notes},
-            {"complete", forecast.repair.is_fillable}};
+  Json json{
+      {"repairs", forecast.repair.done}, {"notes", forecast.repair.notes}, {"complete", forecast.repair.is_fillable}};
   if (forecast.repair.regions) json["regions"] = forecast.repair.regions->regions.size();
   return json;
 }

@@ -84,8 +84,7 @@ Cells as_chosen(Cells cells, const std::string& references) {
 /// Returns what a file holds as a surface: of cells, their boundary.  path: of the file, for messages.
 TriangleMesh surface_of(Content content, const std::filesystem::path& path, std::vector<std::string>& warnings) {
   if (auto* mesh = std::get_if<VolumeMesh>(&content)) return triangulate(tagged_polygons(*mesh).polygons);
-  if (auto* surface = std::get_if<PolygonMesh>(&content))
-    return sound_triangles(*surface, path.string(), &warnings);
+  if (auto* surface = std::get_if<PolygonMesh>(&content)) return sound_triangles(*surface, path.string(), &warnings);
   refuse_curved(path, "a surface is wanted");
 }
 

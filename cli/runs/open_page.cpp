@@ -3,9 +3,9 @@
 
 #include "subvol/base/error.h"
 
+#include <spawn.h>
 #include <cerrno>
 #include <cstring>
-#include <spawn.h>
 #include <string>
 
 extern char** environ;

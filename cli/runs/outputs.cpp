@@ -155,8 +155,8 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
     outputs.push_back(parse_output(text));
     const Part part = outputs.back().part;
     if (part != Part::result && std::find(parts.begin(), parts.end(), part) == parts.end())
-      throw UsageError("-o " + text + ": there is no " +
-                       std::string(kPartNames[static_cast<std::size_t>(part)]) + " here");
+      throw UsageError("-o " + text + ": there is no " + std::string(kPartNames[static_cast<std::size_t>(part)]) +
+                       " here");
     claim(outputs.back().path, options.force);
     std::error_code ignored;
     outputs.back().is_new = !fs::exists(outputs.back().path, ignored);

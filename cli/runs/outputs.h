@@ -26,12 +26,12 @@ struct Output {
   Part part = Part::result;
   std::string region{};  ///< name or number of the part's region
   std::filesystem::path path{};
-  std::string extension{};      ///< lower case, with its dot
-  bool is_new = false;          ///< no such file existed before the work
+  std::string extension{};  ///< lower case, with its dot
+  bool is_new = false;      ///< no such file existed before the work
   /// Returns its format; of a page, one that holds nothing.
   const FileFormat& format() const;
-  bool is_volume() const;       ///< true for a format that holds cells
-  bool is_scene() const;        ///< true for a format that holds scenes
+  bool is_volume() const;  ///< true for a format that holds cells
+  bool is_scene() const;   ///< true for a format that holds scenes
   bool is_page() const { return extension == ".html"; }
 };
 

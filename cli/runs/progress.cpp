@@ -66,8 +66,7 @@ void ProgressTeller::tell(const FitProgress& progress) {
 void ProgressTeller::tell_work(const char* part, double share_of_work) {
   const double share = has_fit_ ? kFitShare + (1 - kFitShare) * share_of_work : share_of_work;
   if (kind_ == Kind::bar) return draw_bar(share, part);
-  if (kind_ == Kind::json)
-    print(Json{{"part", part}, {"share", share_of_work}, {"seconds", seconds()}}.dump() + '\n');
+  if (kind_ == Kind::json) print(Json{{"part", part}, {"share", share_of_work}, {"seconds", seconds()}}.dump() + '\n');
   const auto now = Clock::now();
   if (kind_ != Kind::plain || now - last_ < kWorkInterval) return;
   last_ = now;
@@ -130,9 +129,8 @@ void ProgressTeller::write_line(const FitProgress& progress) {
 }
 
 void ProgressTeller::write_json(const FitProgress& progress) {
-  Json line{{"stage", progress.stage},         {"level", progress.level},
-            {"iteration", progress.iteration}, {"energy", progress.energy},
-            {"fraction", share_done(progress)}, {"seconds", seconds()}};
+  Json line{{"stage", progress.stage},   {"level", progress.level},          {"iteration", progress.iteration},
+            {"energy", progress.energy}, {"fraction", share_done(progress)}, {"seconds", seconds()}};
   if (const double left = seconds_left(share_done(progress)); left >= 0) line["seconds_left"] = left;
   print(line.dump() + '\n');
 }

@@ -49,7 +49,7 @@ class ProgressTeller {
   Clock::time_point start_, last_;
   std::string last_stage_;
   int last_level_ = -1;
-  bool has_fit_ = false;  ///< true if work is what follows a fit
+  bool has_fit_ = false;                       ///< true if work is what follows a fit
   double last_share_ = 0, total_seconds_ = 0;  ///< estimated total time when that share was reached
   bool bar_shown_ = false;
 };

@@ -61,9 +61,7 @@ Json stage_json(const StageRecord& stage) {
 }
 
 Json target_json(const TargetReport& target) {
-  Json json{{"area", target.area},
-            {"volume", target.volume},
-            {"volume_source", to_string(target.volume_source)}};
+  Json json{{"area", target.area}, {"volume", target.volume}, {"volume_source", to_string(target.volume_source)}};
   if (target.num_points > 0) {
     json["points"] = target.num_points;
     return json;
@@ -95,13 +93,13 @@ Json stages_json(const FitReport& report) {
 }
 
 Json fit_json(const FitReport& report) {
-  Json json{{"stop_reason", to_string(report.stop_reason)},
-          {"explanation", report.explanation},
-          {"converged", report.stop_reason == StopReason::converged},
-          {"stages", stages_json(report)},
-          {"initial_distance",
-           {{"mean_percent", report.initial_distance_mean_percent},
-            {"max_percent", report.initial_distance_max_percent}}}};
+  Json json{
+      {"stop_reason", to_string(report.stop_reason)},
+      {"explanation", report.explanation},
+      {"converged", report.stop_reason == StopReason::converged},
+      {"stages", stages_json(report)},
+      {"initial_distance",
+       {{"mean_percent", report.initial_distance_mean_percent}, {"max_percent", report.initial_distance_max_percent}}}};
   if (report.target.area > 0) json["target"] = target_json(report.target);
   return json;
 }

@@ -27,9 +27,9 @@ void require_boundary(const VolumeMesh& mesh);
 
 /// The meshes that a report is about, from the files that it names, as they are now.
 struct ReportMeshes {
-  std::optional<PolygonMesh> target;   ///< the surface, of triangles
-  std::optional<ShownMesh> before;     ///< the template, or the mesh that was given
-  std::optional<ShownMesh> result;     ///< of `check`: the mesh that was checked
+  std::optional<PolygonMesh> target;  ///< the surface, of triangles
+  std::optional<ShownMesh> before;    ///< the template, or the mesh that was given
+  std::optional<ShownMesh> result;    ///< of `check`: the mesh that was checked
   /// The control cage of which the result is a refinement. None if there is no such output.
   std::optional<VolumeMesh> cage;
 };

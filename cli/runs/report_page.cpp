@@ -135,9 +135,9 @@ std::string trials(const Json& report) {
                  entry("max_percent"), edges, entry("merit"), chosen ? "chosen" : ""});
   }
   if (rows.empty()) return "";
-  return table({"", "cells", "least scaled Jacobian", "mean distance, %", "max distance, %", "edges followed", "merit",
-                ""},
-               rows);
+  return table(
+      {"", "cells", "least scaled Jacobian", "mean distance, %", "max distance, %", "edges followed", "merit", ""},
+      rows);
 }
 
 std::string missed_edges(const Json& report) {

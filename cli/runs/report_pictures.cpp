@@ -181,8 +181,10 @@ class Painter {
     if (result && target && !report_.value("limit_surface_distance", report_.value("distance", Json())).is_null())
       attempt([&] { add_distance(*result, *target); });
     if (result && !result->quality.empty()) {
-      if (meshes_.cage) attempt([&] { add_limit(*meshes_.cage); });
-      else add_quality(*result);
+      if (meshes_.cage)
+        attempt([&] { add_limit(*meshes_.cage); });
+      else
+        add_quality(*result);
       attempt([&] {
         add("Result, cut open: scaled Jacobian of the cells",
             cut_open(*meshes_.result, view_, cell_minima(*meshes_.result)), "0", "1");

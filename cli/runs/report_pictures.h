@@ -12,8 +12,8 @@ namespace subvol::cli {
 /// A picture of a report; all of them are drawn from the same side and at the same scale.
 struct ReportPicture {
   std::string title;
-  std::string png;                 ///< the file's bytes, transparent where nothing is drawn
-  std::string low, high;           ///< meanings of the two ends of the color scale; empty: no colors
+  std::string png;        ///< the file's bytes, transparent where nothing is drawn
+  std::string low, high;  ///< meanings of the two ends of the color scale; empty: no colors
 };
 
 /// Draws the meshes of a report: the surface, the mesh that was given, the result colored by distance to the surface

@@ -22,13 +22,13 @@ struct RunOptions {
   std::vector<std::string> outputs;  ///< -o, as given
   std::string report;                ///< empty: none
   bool force = false, quiet = false;
-  int threads = 0;                   ///< 0: all cores
-  std::size_t memory_limit = 0;      ///< bytes; 0: none
+  int threads = 0;               ///< 0: all cores
+  std::size_t memory_limit = 0;  ///< bytes; 0: none
   unsigned seed = 0;
-  std::string progress;              ///< bar, plain, json, none; empty: depends on stderr
-  std::string checkpoint, resume;    ///< empty: none
-  std::string references;            ///< cell data that become the cells' references; empty: the usual ones
-  double every_seconds = 60;         ///< least time between two writes of the checkpoint
+  std::string progress;            ///< bar, plain, json, none; empty: depends on stderr
+  std::string checkpoint, resume;  ///< empty: none
+  std::string references;          ///< cell data that become the cells' references; empty: the usual ones
+  double every_seconds = 60;       ///< least time between two writes of the checkpoint
 };
 
 /// Sets OpenMP's number of threads from --threads, here and nowhere else, and makes --memory-limit the process's own

@@ -216,8 +216,8 @@ void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surfac
   for (const Output& output : outputs) {
     if (output.part == Part::cage) continue;
     if (output.extension == ".usda")
-      throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
-                       output.path.string());
+      throw UsageError(output.path.string() +
+                       ": .usda holds subdivision cages, not curved cells; take .glb or cage:" + output.path.string());
     require_for_curved_cells(output, kind_orders(kinds, order));
   }
 }

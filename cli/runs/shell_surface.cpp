@@ -50,8 +50,7 @@ std::vector<char> patch_named(const PolygonMesh& surface, const std::string& nam
   }
   if (found) return is_in;
   if (const std::optional<Vec3> point = point_of(name)) return patch_of_face(surface, closest_face(surface, *point));
-  throw UsageError("--skip: the surface has no group " + in_quotes(name) +
-                   (known.empty() ? "" : "; it has " + known) +
+  throw UsageError("--skip: the surface has no group " + in_quotes(name) + (known.empty() ? "" : "; it has " + known) +
                    "; a patch between sharp edges can be given by a point on it, as X,Y,Z");
 }
 

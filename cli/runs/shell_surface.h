@@ -19,14 +19,14 @@ namespace subvol::cli {
 struct ShellSurfaceOptions {
   std::string region;  ///< name or number of the region on whose boundary layers grow; empty: all regions
   ShellSide side = ShellSide::outward;  ///< on which layers grow
-  std::vector<std::string> skipped;  ///< patches to leave out, each by group or point (`prepared_surface`)
-  double repair_distance = 0;        ///< of `mend_surface`, in the surface's unit; 0: it is taken as it is
-  std::function<bool()> cancelled;   ///< as in `mend_surface`
+  std::vector<std::string> skipped;     ///< patches to leave out, each by group or point (`prepared_surface`)
+  double repair_distance = 0;           ///< of `mend_surface`, in the surface's unit; 0: it is taken as it is
+  std::function<bool()> cancelled;      ///< as in `mend_surface`
 };
 
 /// A patch that was left out.
 struct SkippedPatch {
-  std::string name;   ///< as the user gave it
+  std::string name;  ///< as the user gave it
   std::size_t faces;
   double area;
 };
@@ -38,9 +38,9 @@ struct ShellSurface {
   std::vector<BorderPlane> border_planes;
   std::vector<Index> vertex_numbers, face_numbers;  ///< those of the given surface; empty: the same
   std::vector<SkippedPatch> skipped;
-  std::optional<std::string> note;                  ///< a sentence about faces between regions that were left out
-  MendedSurface mended;                             ///< its counts and distance only
-  double repair_distance = 0;                       ///< that was allowed
+  std::optional<std::string> note;  ///< a sentence about faces between regions that were left out
+  MendedSurface mended;             ///< its counts and distance only
+  double repair_distance = 0;       ///< that was allowed
   bool is_cancelled = false;
 };
 

@@ -19,8 +19,8 @@ using internal::ViewerMesh;
 
 /// What to show of a mesh besides its cells.
 struct ViewingOptions {
-  const TriangleMesh* target = nullptr;  ///< the surface to measure distances to and to show as a ghost; or null
-  bool limit = false;                    ///< the mesh is a control cage: show its limit surface
+  const TriangleMesh* target = nullptr;       ///< the surface to measure distances to and to show as a ghost; or null
+  bool limit = false;                         ///< the mesh is a control cage: show its limit surface
   double chord_percent = kSceneChordPercent;  ///< of that surface, in percent of the diagonal of its box
 };
 

@@ -227,8 +227,8 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
   if (!shows_surface(output)) return write_output(output, mesh, options);
   const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
   // The faces of the cage are those of the limit surface.
-  write_scene(output.path, surface_scene(*limit, quality, grouped_scene_options(output, options, cage.face_groups,
-                                                                                MeshTopology(cage))));
+  write_scene(output.path, surface_scene(*limit, quality,
+                                         grouped_scene_options(output, options, cage.face_groups, MeshTopology(cage))));
 }
 
 namespace {
@@ -282,8 +282,9 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
     return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options),
                                                   cell_regions(labels_of(file))));
   if (output.is_scene())
-    return write_scene(output.path, surface_scene(mesh, minima, grouped_scene_options(output, options, file.face_groups,
-                                                                                      mesh.space.topology())));
+    return write_scene(
+        output.path,
+        surface_scene(mesh, minima, grouped_scene_options(output, options, file.face_groups, mesh.space.topology())));
   write_curved_cells(output, mesh, file_options(file, minima, options));
 }
 

@@ -21,18 +21,18 @@ namespace subvol::cli {
 
 /// How surfaces for DCC tools are written.
 struct WritingOptions {
-  double chord_percent = 0.005;   ///< largest chord error of a tessellation, in percent of its bounding box's diagonal
+  double chord_percent = 0.005;  ///< largest chord error of a tessellation, in percent of its bounding box's diagonal
   double meters_per_unit = 1;
   std::string up_axis = "y";
-  std::filesystem::path source;   ///< file that the result was made from, stored in the output
-  Json options = Json::object();  ///< options in force, stored in the output
-  CutPlane cut{};                 ///< plane of cutaways
-  bool no_wireframe = false;      ///< leaves the cells' edges out of scenes
-  bool quantize = false;          ///< writes scenes with small integers
+  std::filesystem::path source;                         ///< file that the result was made from, stored in the output
+  Json options = Json::object();                        ///< options in force, stored in the output
+  CutPlane cut{};                                       ///< plane of cutaways
+  bool no_wireframe = false;                            ///< leaves the cells' edges out of scenes
+  bool quantize = false;                                ///< writes scenes with small integers
   double map_tolerance_percent = kMapTolerancePercent;  ///< of polynomial cells in place of curved ones
   MshVersion msh_version = MshVersion::v4_1;
   VtuCells vtu_cells = VtuCells::lagrange;
-  int linear_intervals = 0;       ///< per edge of a curved cell in .mesh and .vtk; 0: its mesh's largest order
+  int linear_intervals = 0;  ///< per edge of a curved cell in .mesh and .vtk; 0: its mesh's largest order
 };
 
 /// Largest chord error of surfaces that are measured, in percent as above; coarse scenes do not make a coarse check.

@@ -51,10 +51,10 @@ class AutomaticFitRun : public CageRun {
   bool has_cage() const { return result_.cage.num_cells() > 0; }
 
   const AutomaticFitArguments& arguments_;
-  TriangleMesh target_;                ///< repaired
+  TriangleMesh target_;                   ///< repaired
   std::optional<RegionSurface> regions_;  ///< of the target, if there are several
-  TriangleMesh outer_;                 ///< the target's surface without its interfaces, if there are regions
-  std::vector<std::string> repairs_;   ///< made to the target
+  TriangleMesh outer_;                    ///< the target's surface without its interfaces, if there are regions
+  std::vector<std::string> repairs_;      ///< made to the target
   std::optional<Checkpointing> checkpointing_;
   AutomaticFitResult result_;
   GroupsFound groups_;
@@ -68,8 +68,7 @@ void AutomaticFitRun::load() {
     has_only_points = !is_nodal_extension(arguments_.target) && is_point_cloud_file(arguments_.target);
   }
   require_fitting_options(verb_, has_only_points);
-  if (has_only_points)
-    throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
+  if (has_only_points) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   SurfaceRepair repair = load_to_fill(arguments_.target, {arguments_.fit.regions, arguments_.wrap_percent}, warnings_);
   target_ = std::move(repair.surface);
   warn_of_missing_groups(verb_, target_, warnings_);

@@ -26,8 +26,8 @@ struct AutomaticFitArguments {
   std::optional<double> mean_tolerance_percent, max_tolerance_percent;
   std::optional<double> least_quality;  ///< the same for the least scaled Jacobian
   std::string target;
-  std::optional<double> wrap_percent;  ///< `WrapOptions::voxel_percent`; nothing: the target is not wrapped
-  std::optional<double> size;          ///< edge length of the cells, in the target's unit; replaces fit.cells
+  std::optional<double> wrap_percent;         ///< `WrapOptions::voxel_percent`; nothing: the target is not wrapped
+  std::optional<double> size;                 ///< edge length of the cells, in the target's unit; replaces fit.cells
   std::vector<std::string> unused_options{};  ///< names, without dashes, of options whose defaults play no part here
 };
 

@@ -107,7 +107,8 @@ PlanOptions plan_of(const BatchArguments& arguments) {
   plan.only_failed = arguments.only == "failed";
   if (plan.only_failed) return plan;
   plan.only = outcome_named(arguments.only);
-  if (!plan.only) throw UsageError("--only: expected failed, or a class of failure as time_limit, not " + arguments.only);
+  if (!plan.only)
+    throw UsageError("--only: expected failed, or a class of failure as time_limit, not " + arguments.only);
   return plan;
 }
 
@@ -116,7 +117,8 @@ void tell_result(const BatchResult& result) {
   if (result.num_elsewhere > 0) std::cerr << ", " << result.num_elsewhere << " taken by other workers";
   for (std::size_t i = 0; i < kNumOutcomes; ++i)
     if (result.counts[i] > 0) std::cerr << "; " << result.counts[i] << ' ' << name_of(static_cast<Outcome>(i));
-  if (const std::size_t left = result.num_models - result.num_recorded(); left > 0) std::cerr << "; " << left << " to be run";
+  if (const std::size_t left = result.num_models - result.num_recorded(); left > 0)
+    std::cerr << "; " << left << " to be run";
   std::cerr << '\n';
 }
 
@@ -183,7 +185,8 @@ std::string picture_of(const fs::path& folder) {
     const ReportMeshes meshes = load_report_meshes(report, folder, notes);
     std::vector<ReportPicture> pictures = report_pictures(report, meshes, notes);
     // The last one with a scale of colors: of the result, or of its cells inside.
-    const auto colored = std::find_if(pictures.rbegin(), pictures.rend(), [](const auto& p) { return !p.high.empty(); });
+    const auto colored =
+        std::find_if(pictures.rbegin(), pictures.rend(), [](const auto& p) { return !p.high.empty(); });
     return colored == pictures.rend() ? std::string() : std::move(colored->png);
   } catch (const InputError&) {
   } catch (const Json::exception&) {
@@ -256,8 +259,10 @@ int run_batch_merge(const MergeArguments& arguments) {
   const LatestRecords records(paths_of(arguments.folders));
   std::string text;
   records.for_each([&](const LatestRecords::Entry& entry) {
-    if (arguments.reproducible) text += without_run(entry.line);
-    else text += entry.line;
+    if (arguments.reproducible)
+      text += without_run(entry.line);
+    else
+      text += entry.line;
     text += '\n';
   });
   write_file_atomically(arguments.output, text);
@@ -314,8 +319,7 @@ void add_process_options(CLI::App& verb, BatchOptions& options) {
   verb.add_option("--time-limit", options.time_limit_seconds, "End a model after this time: its class is time_limit")
       ->check(number_in(0.001, 1e9))
       ->type_name("SECONDS");
-  verb.add_option("--grace", options.grace_seconds,
-                  "Time that a model has to end after the limit, before it is killed")
+  verb.add_option("--grace", options.grace_seconds, "Time that a model has to end after the limit, before it is killed")
       ->check(number_in(0, 1e6))
       ->type_name("SECONDS")
       ->capture_default_str();
@@ -325,7 +329,8 @@ void add_process_options(CLI::App& verb, BatchOptions& options) {
       ->type_name("FILE");
 }
 
-constexpr const char* kFooter = R"(FOLDER receives records.jsonl, one line for each model as it ends, and models/ID with the outputs, the
+constexpr const char* kFooter =
+    R"(FOLDER receives records.jsonl, one line for each model as it ends, and models/ID with the outputs, the
 report and the messages of each model. Called again, the batch goes on: models with a record of the same
 input, options and version are kept. Several batches may work on one folder.
 
@@ -348,8 +353,7 @@ void add_batch_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("batch", "Run a verb on many models, and go on where it was ended");
   const auto arguments = std::make_shared<BatchArguments>();
   arguments->options.jobs = 0;
-  verb->add_option("MODELS", arguments->words,
-                   "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs");
+  verb->add_option("MODELS", arguments->words, "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs");
   // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS,
   // which comes first, receives them; this one shows them in the help.
   verb->add_option("OPTIONS", arguments->words_for_all, "Options for every model, behind --");
@@ -377,8 +381,7 @@ void add_batch_command(CLI::App& app, Action& action) {
   verb->footer(kFooter);
   const auto verbs = std::make_shared<ParserVerbs>(app);
   verb->callback([arguments, verbs, verb, &action] {
-    if (verb->get_subcommands().empty())
-      action = [arguments, verbs] { return run_batch_verb(*arguments, *verbs); };
+    if (verb->get_subcommands().empty()) action = [arguments, verbs] { return run_batch_verb(*arguments, *verbs); };
   });
 }
 

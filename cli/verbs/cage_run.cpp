@@ -40,7 +40,8 @@ void CageRun::measure_limit(const VolumeMesh& cage, const Target& target, const 
   fine.chord_percent = measured_chord_percent(writing);
   if (fine.chord_percent < writing.chord_percent)
     limit_.surface = watched([&](auto progress) { return tessellated_limit(cage, fine, progress); });
-  limit_.distance = std::visit([&](const auto& t) { return surface_distance(triangles_of(limit_.surface), t); }, target);
+  limit_.distance =
+      std::visit([&](const auto& t) { return surface_distance(triangles_of(limit_.surface), t); }, target);
 }
 
 }  // namespace subvol::cli

@@ -17,8 +17,8 @@ class CageRun : public LongRun {
  protected:
   using LongRun::LongRun;
 
-  /// Writes all outputs. cage: without cells if there is none. states: of the cage, or of the mesh if there is none, for
-  /// animations.
+  /// Writes all outputs. cage: without cells if there is none. states: of the cage, or of the mesh if there is none,
+  /// for animations.
   void write_results(const VolumeMesh& cage, const VolumeMesh& mesh, std::span<const FitState> states,
                      const WritingOptions& writing);
   /// Measures the distance between the limit surface of the cage and a target.

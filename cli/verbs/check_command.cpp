@@ -105,8 +105,10 @@ void tell_check(const CheckArguments& arguments, const std::vector<std::string>&
   if (!arguments.run.quiet)
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
   if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
-  if (arguments.json) print(json_text(json));
-  else if (!arguments.run.quiet) print(text);
+  if (arguments.json)
+    print(json_text(json));
+  else if (!arguments.run.quiet)
+    print(text);
 }
 
 /// Returns the regions of a surface, if it has several.
@@ -184,9 +186,9 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
 }  // namespace
 
 void add_check_command(CLI::App& app, Action& action) {
-  CLI::App* verb =
-      app.add_subcommand("check", "Say what is true of a volume mesh (defects, quality, certificate, distance), or "
-                                  "what is in the way of filling a surface");
+  CLI::App* verb = app.add_subcommand("check",
+                                      "Say what is true of a volume mesh (defects, quality, certificate, distance), or "
+                                      "what is in the way of filling a surface");
   const auto arguments = std::make_shared<CheckArguments>();
   verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats() + "; or surface: " + surface_formats())
       ->required()

@@ -42,8 +42,7 @@ std::vector<std::string> options_of(const CLI::App& verb) {
 std::vector<std::string> words_of(const CLI::Option& option) {
   std::string text = option.get_type_name();
   text.erase(std::min(text.find(':'), text.size()));  // the part that a validator adds
-  const bool is_list = text.find('|') != std::string::npos &&
-                       std::all_of(text.begin(), text.end(), [](char c) {
+  const bool is_list = text.find('|') != std::string::npos && std::all_of(text.begin(), text.end(), [](char c) {
                          return (c >= 'a' && c <= 'z') || c == '|' || c == '_' || c == '-';
                        });
   std::vector<std::string> words;

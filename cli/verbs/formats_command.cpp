@@ -18,7 +18,9 @@ void add_formats_command(CLI::App& app, Action& action) {
         if ((format.needs_netcdf && !has_exodus()) || (format.needs_cgns && !has_cgns()) ||
             (format.needs_assimp && !has_assimp()))
           text += std::string(format.extension) + ": not in this build, which has no " +
-                  (format.needs_netcdf ? "netCDF\n" : format.needs_cgns ? "CGNS library\n" : "Assimp\n");
+                  (format.needs_netcdf ? "netCDF\n"
+                   : format.needs_cgns ? "CGNS library\n"
+                                       : "Assimp\n");
       print(text);
       return static_cast<int>(kDone);
     };

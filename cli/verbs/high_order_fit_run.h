@@ -23,7 +23,7 @@ struct HighOrderFitArguments {
   const char* command = "fit";  ///< the verb, for messages and the report
   /// True: all invalid cells of the template are untangled first. False: only if the template has few inverted cells.
   bool untangles = false;
-  bool takes_points = true;     ///< the target may be points
+  bool takes_points = true;               ///< the target may be points
   std::optional<double> quality_floor{};  ///< least scaled Jacobian that counts as a success
   AutomaticFitOptions template_fit{};     ///< how a template is made if none is given; the time limit is that of `fit`
 };

@@ -64,7 +64,8 @@ void add_report_command(CLI::App& app, Action& action) {
   verb->add_option("-o,--output", arguments->output, "The page: one file that needs nothing else")
       ->required()
       ->type_name("FILE.html");
-  verb->add_flag("--no-pictures", arguments->no_pictures, "Leave out the viewer and the pictures: the meshes need not be there");
+  verb->add_flag("--no-pictures", arguments->no_pictures,
+                 "Leave out the viewer and the pictures: the meshes need not be there");
   verb->add_flag("--no-viewer", arguments->no_viewer, "Leave out the viewer: a page without scripts, of pictures only");
   verb->add_flag("--force", arguments->force, "Replace an existing file");
   verb->add_flag("--quiet", arguments->quiet, "Print nothing");

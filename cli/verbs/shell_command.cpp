@@ -83,7 +83,7 @@ class ShellRun : public LongRun {
   std::optional<CurvedShell> curved_;
   ShellFailures failures_;
   std::vector<PolynomialCells> polynomials_;
-  std::optional<MeshCheck> linear_;  ///< of linear cells that were written in place of the curved ones
+  std::optional<MeshCheck> linear_;               ///< of linear cells that were written in place of the curved ones
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
 };
 
@@ -229,8 +229,8 @@ void ShellRun::check_subdivided() {
   subdivided_ = certify(subdivide(result_.mesh, BoundaryRule::catmull_clark).fine);
   if (subdivided_->all_certified()) return;
   add_warnings({std::to_string(subdivided_->not_certified.size()) + " of " +
-                      std::to_string(subdivided_->certified + subdivided_->not_certified.size()) +
-                      " cells are not certified once the control mesh is subdivided"});
+                std::to_string(subdivided_->certified + subdivided_->not_certified.size()) +
+                " cells are not certified once the control mesh is subdivided"});
 }
 
 Json ShellRun::report() const {
@@ -401,9 +401,8 @@ void add_shell_command(CLI::App& app, Action& action) {
 The shell is thinner where there is no room; the report and the files say where. What is written is checked:
 every cell certified, no sheet meeting another; otherwise exit status 1.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
-  verb->callback([arguments, verb, &action] {
-    action = [arguments, verb] { return ShellRun(*arguments, *verb).run(); };
-  });
+  verb->callback(
+      [arguments, verb, &action] { action = [arguments, verb] { return ShellRun(*arguments, *verb).run(); }; });
 }
 
 }  // namespace subvol::cli

@@ -85,19 +85,18 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
   if (has_limit && std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
-  return write_checked(
-      arguments.run, std::move(outputs), fine,
-      [&](const Output& output) {
-        if (has_limit || output.part == Part::cage)
-          write_output(output, cage, fine, &limit, writing);
-        else
-          write_output(output, fine, writing);
-      },
-      warnings,
-      {{"command", "subdivide"},
-       {"options", options_in_force(verb)},
-       {"input", input},
-       {"result", describe("", fine)}});
+  return write_checked(arguments.run, std::move(outputs), fine,
+                       [&](const Output& output) {
+                         if (has_limit || output.part == Part::cage)
+                           write_output(output, cage, fine, &limit, writing);
+                         else
+                           write_output(output, fine, writing);
+                       },
+                       warnings,
+                       {{"command", "subdivide"},
+                        {"options", options_in_force(verb)},
+                        {"input", input},
+                        {"result", describe("", fine)}});
 }
 
 }  // namespace

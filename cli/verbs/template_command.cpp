@@ -28,8 +28,8 @@ std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& ver
   return outputs;
 }
 
-int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
-                   const VolumeMesh& mesh, const Json& details) {
+int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs, const VolumeMesh& mesh,
+                   const Json& details) {
   WritingOptions writing = run.writing;
   writing.options = options_of_result(verb);
   Json report{{"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};

@@ -25,8 +25,8 @@ void add_template_options(CLI::App& verb, TemplateRun& run);
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb);
 
 /// Writes a template, its report (`details` and the common entries) and a summary, as `write_checked`.
-int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
-                   const VolumeMesh& mesh, const Json& details);
+int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs, const VolumeMesh& mesh,
+                   const Json& details);
 
 /// Each adds one group of verbs.
 void add_template_auto(CLI::App& group, Action& action);

@@ -356,7 +356,9 @@ void add_split(CLI::App& group, Action& action) {
                             make_split, "template.mesh --into tets -o tets.mesh");
   add_mesh(*verb, *a);
   verb->add_option("--into", a->what, "Layers of the sheet of an edge; prisms along an edge; tets")
-      ->check(CLI::IsMember({"parts", "prisms", "tets"}))->type_name("parts|prisms|tets")->capture_default_str();
+      ->check(CLI::IsMember({"parts", "prisms", "tets"}))
+      ->type_name("parts|prisms|tets")
+      ->capture_default_str();
   add_vertices(*verb, *a, "--edge", "Ends of the edge, numbered from 0");
   verb->add_option("--parts", a->parts, "Number of layers into which the sheet is cut")
       ->check(whole_number_in(2, 1000))

@@ -70,8 +70,8 @@ void hex_coefficients(const std::array<Vector<T>, 8>& x, std::array<T, 27>& d, E
     std::array<std::array<Vector<T>, 2>, 2> normal;  // mean of b_ik x c_i'j over i + i' = I, at [j][k]
     for (int j = 0; j < 2; ++j)
       for (int k = 0; k < 2; ++k)
-        normal[j][k] = i == 1 ? mean(cross(b[0][k], c[1][j]), cross(b[1][k], c[0][j]))
-                              : cross(b[i / 2][k], c[i / 2][j]);
+        normal[j][k] =
+            i == 1 ? mean(cross(b[0][k], c[1][j]), cross(b[1][k], c[0][j])) : cross(b[i / 2][k], c[i / 2][j]);
     T* out = d.data() + 9 * i;
     for (int j = 0; j < 2; ++j)
       for (int k = 0; k < 2; ++k) out[6 * j + 2 * k] = dot(a[j][k], normal[j][k]);

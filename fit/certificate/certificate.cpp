@@ -372,9 +372,8 @@ std::size_t positive_bernstein(std::span<const Vec3> positions, const VolumeMesh
                                std::span<std::uint8_t> positive) {
   check_size("positions", positions.size(), mesh.num_vertices(), true);
   check_size("flags", positive.size(), mesh.num_cells(), false);
-  for_each_cell_bounds(positions, mesh, [&](std::size_t c, const Bounds& b) {
-    positive[c] = b.validity() == CellValidity::valid;
-  });
+  for_each_cell_bounds(positions, mesh,
+                       [&](std::size_t c, const Bounds& b) { positive[c] = b.validity() == CellValidity::valid; });
   return static_cast<std::size_t>(std::count(positive.begin(), positive.end(), 0));
 }
 

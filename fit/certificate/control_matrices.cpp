@@ -167,8 +167,8 @@ class Extremes {
   double determinant(const Vec3& scale) const {
     constexpr double kNumberRoundoff = std::numeric_limits<Number>::epsilon() / 2;
     const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes_[e]) * scale[i] * scale[k]; };
-    const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
-                                     scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
+    const double largest = std::max(
+        {scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2), scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
     const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
     // A second minor has products of two entries with at most 3 roundings each, a third minor six of three with 5 or 6.
     const double least = to_third * lowest_lane(third_) - 100 * kNumberRoundoff * largest * largest * largest;
@@ -191,8 +191,8 @@ class Extremes {
 template <class Vector>
 Bound failed_at(std::size_t begin, const MatrixOf<Vector>& m, const Extremes<Vector>& own) {
   const Vector det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-                   m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                   m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+                     m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                     m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
   return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 implies det J_b > 0
 }
 
@@ -229,13 +229,16 @@ Vec3 sums_of_both(const Mat3& g) { return g.rowwise().sum() + g.colwise().sum().
 /// D is multiplied by the length of the mean's longest column, so that no entry of T_b below is much above 1.
 struct Scaling {
   Scaling(const Mat3& mean_matrix, const Vec3& mean_lengths, const Mat3& remainder)
-      : mean(mean_matrix), lengths(mean_lengths), longest(lengths.maxCoeff()),
-        scale(longest * lengths.cwiseInverse()), unscaling(lengths / (longest * longest)),
+      : mean(mean_matrix),
+        lengths(mean_lengths),
+        longest(lengths.maxCoeff()),
+        scale(longest * lengths.cwiseInverse()),
+        unscaling(lengths / (longest * longest)),
         squared_unscaling((lengths / longest).cwiseAbs2()),
         scaled_remainder(remainder * (scale / longest).asDiagonal()) {}
 
   Mat3 mean;
-  Vec3 lengths;            ///< of the columns of `mean`
+  Vec3 lengths;  ///< of the columns of `mean`
   double longest;
   Vec3 scale;              ///< D times `longest`
   Vec3 unscaling;          ///< 1 over `scale` and over `longest`
@@ -369,8 +372,7 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   result = bound(from_frame(framed_scale, rotation), result.in_the_way);
   if (result.is_final) return result.value;
 
-  const Vec3 c =
-      scales_by_variation(variation(matrices, mean, rotation, is_framed ? &frame : nullptr), framed_lengths);
+  const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, is_framed ? &frame : nullptr), framed_lengths);
   const double size = std::cbrt(framed.determinant());
   Mat3 l = from_frame(c, unrotate(framed * (c / size).asDiagonal()));
   result = bound(l, result.in_the_way);

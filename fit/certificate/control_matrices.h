@@ -128,7 +128,7 @@ struct BoundOptions {
 /// Matrices   ControlMatrices, HexMatrices, NarrowHexMatrices or PrismMatrices (not const: they hold scratch memory).
 ///            For NarrowHexMatrices, R excludes single-precision errors, which they bound themselves.
 template <class Matrices>
-double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame,
-                         const BoundOptions& options = {}, Mat3* near_l = nullptr);
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, const BoundOptions& options = {},
+                         Mat3* near_l = nullptr);
 
 }  // namespace subvol::internal

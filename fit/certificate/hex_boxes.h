@@ -50,9 +50,9 @@ class HexBoxes {
     int level = 0;  ///< number of bisections, over all directions
     /// The box that the models are made for: this one, or an enclosing one.
     std::array<int, 3> modeled_levels{}, modeled_index{};
-    int halved = 0;     ///< number of bisections of the coefficients since then
-    double wanted = -1; ///< largest error of a direction's models, relative to the mean edges; < 0: the default
-    int split = 0;      ///< direction of the next bisection
+    int halved = 0;          ///< number of bisections of the coefficients since then
+    double wanted = -1;      ///< largest error of a direction's models, relative to the mean edges; < 0: the default
+    int split = 0;           ///< direction of the next bisection
     bool is_precise = true;  ///< true if coefficients are in double precision
     Mat3 near_l = Mat3::Zero();  ///< L of `determinant_bound`: the last one for this box, or the enclosing one
     // One of these is set once the box has been examined; few boxes keep theirs.
@@ -146,14 +146,14 @@ class HexBoxes {
   /// Effect of single-precision errors on J, relative to the mean edges.
   double narrow_error_size(const Box& box) const;
 
-  int n_;                                        // functions per direction
-  int lanes_;                                    // n_ rounded up to a multiple of kWide
+  int n_;      // functions per direction
+  int lanes_;  // n_ rounded up to a multiple of kWide
   HexContraction contraction_;
   CoefficientsPool<Wide> pool_;
   CoefficientsPool<Narrow> narrow_pool_;
   HexMatrices matrices_;
   NarrowHexMatrices narrow_matrices_;
-  Vec3 mean_edges_;                              // lengths of the linear part's mean columns
+  Vec3 mean_edges_;  // lengths of the linear part's mean columns
   Vec3 inverse_mean_edges_;
   // For i >= 2: bound, in that entry of J, of the sum over the other two indices of a_ijk times their functions. For
   // i = 1: the bound of the same sum of a_1jk - a_0jk along u, in column u.
@@ -162,15 +162,15 @@ class HexBoxes {
   }
   static constexpr int kWeights = 2 * kWide;  // a matrix, column by column, padded to whole vectors
   AlignedDoubles weights_;
-  std::array<AlignedDoubles, 3> is_used_;        // by direction: 1 for functions with nonzero weights
-  bool fits_single_ = true;                      // false if the cell's size may overflow or underflow there
-  std::size_t cell_ = 0;                         // number of the current cell, from 1
+  std::array<AlignedDoubles, 3> is_used_;  // by direction: 1 for functions with nonzero weights
+  bool fits_single_ = true;                // false if the cell's size may overflow or underflow there
+  std::size_t cell_ = 0;                   // number of the current cell, from 1
   using Zones = std::array<LineError, LineModels::kZones>;
   std::array<std::array<std::array<Zones, HexContraction::kMostHexTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
   LineModels::PerFunction bounds_, slope_bounds_;  // of N_i and N_i'
   // In lanes: bounds of N_i from i = 2 on, of their slopes, and the inverses of both.
   AlignedDoubles mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;
-  AlignedDoubles sums_;                            // scratch of make_weights
+  AlignedDoubles sums_;  // scratch of make_weights
 };
 
 }  // namespace subvol::internal

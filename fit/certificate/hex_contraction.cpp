@@ -113,7 +113,9 @@ void HexContraction::Contracted::keep(const HexPart& wanted) {
 }
 
 HexContraction::HexContraction(Basis basis, int order)
-    : n_(order + 1), face_(n_ * n_), lanes_((n_ + kWide - 1) / kWide * kWide),
+    : n_(order + 1),
+      face_(n_ * n_),
+      lanes_((n_ + kWide - 1) / kWide * kWide),
       row_((3 * face_ + kRow - 1) / kRow * kRow) {
   for (const int degree : model_degrees(basis, order)) tiers_[0].push_back(&LineModels::get(basis, order, degree));
   tiers_[1] = {&LineModels::get(basis, order, kWide - 1)};
@@ -213,7 +215,7 @@ void HexContraction::contract_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
   const Lines<double> in{modes_.data(), row_, 3 * face_, used_.data()};
   internal::contract<Of::values>(line.degree() + 1, line.coefficients(line.level(part.levels[2]), part.index[2]), in,
-                               kNoMore, after_w_.data(), row_);
+                                 kNoMore, after_w_.data(), row_);
 }
 
 void HexContraction::contract_v(const HexPart& part) {
@@ -248,8 +250,8 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
     for (int i = 1; i < n_; ++i) {
       const int at = i * LineModels::kStride;
       more += middles[i] * load<Narrow>(deviations + at);
-      size += others[at + LineModels::kLargestDeviation] * middle_sizes[i] +
-              others[at + LineModels::kLargest] * sizes[i];
+      size +=
+          others[at + LineModels::kLargestDeviation] * middle_sizes[i] + others[at + LineModels::kLargest] * sizes[i];
     }
     const Lines<float> in{numbers(narrow_v_[d].data()), row, row, all_used_.data()};
     internal::contract<Of::values>(num_u, coefficients, in, numbers(&more), numbers(result.coordinate(d)), row);
@@ -298,8 +300,8 @@ void HexContraction::contract_narrow_v(const HexPart& part) {
         const Narrow s = load<Narrow>(middle_sizes_w + j * n_);
         middle += other[LineModels::kMiddle] * load<Narrow>(middles + j * n_ + i);
         middle_size += other[LineModels::kMiddleSize] * s;
-        sizes += other[LineModels::kLargestDeviation] * s +
-                 other[LineModels::kLargest] * load<Narrow>(sizes_w + j * n_);
+        sizes +=
+            other[LineModels::kLargestDeviation] * s + other[LineModels::kLargest] * load<Narrow>(sizes_w + j * n_);
       }
       store_wide(middle, middles_v_.data() + d * lanes_ + i);
       store_wide(middle_size, middle_sizes_v_.data() + d * lanes_ + i);

@@ -92,9 +92,9 @@ class HexContraction {
   AlignedDoubles modes_;                 // a_ijk at k row_ + j n + i
   const LocalMode* of_modes_ = nullptr;  // the modes that places_ and used_ are made for
   std::size_t num_modes_ = 0;
-  std::vector<int> places_;              // position of each mode
-  std::vector<int> used_;                // for each kRow numbers of a row: the first k from which on all are 0
-  std::vector<int> all_used_;            // the same if all are used
+  std::vector<int> places_;    // position of each mode
+  std::vector<int> used_;      // for each kRow numbers of a row: the first k from which on all are 0
+  std::vector<int> all_used_;  // the same if all are used
   Vec3 total_;
 
   Contracted contracted_;
@@ -109,7 +109,7 @@ class HexContraction {
   std::array<Vectors<Narrow>, 3> narrow_v_;  // V at i q1_w + q, lane p
   Vectors<Narrow> more_;                     // sum_j d_jp M_j at i, lane p
   Vectors<Narrow> no_narrow_more_;
-  AlignedFloats middles_v_;                  // M' at i
+  AlignedFloats middles_v_;  // M' at i
   // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: s = sum_k d_k |a_k| at j n + i, then S = sum_k |c_k| |a_k|;
   // sum_j (d_j S_j + b_j s_j) at i; sum_j |c_j| S_j.
   AlignedFloats sizes_w_, sizes_v_, middle_sizes_v_;

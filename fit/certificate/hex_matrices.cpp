@@ -196,9 +196,9 @@ NarrowHexMatrices::NarrowProduct NarrowHexMatrices::narrow_product(const Mat3& l
   for (int row = 0; row < 3; ++row) {
     float* out = numbers(product_.coordinate(row));
     for (int n = 0; n < count; n += kWideFloats)  // values beyond the end have weight 0
-      store_wide(factors(row, 0) * load_wide(x + n) + factors(row, 1) * load_wide(y + n) +
-                     factors(row, 2) * load_wide(z + n),
-                 out + n);
+      store_wide(
+          factors(row, 0) * load_wide(x + n) + factors(row, 1) * load_wide(y + n) + factors(row, 2) * load_wide(z + n),
+          out + n);
   }
   return NarrowProduct(*this);
 }

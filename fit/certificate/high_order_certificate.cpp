@@ -90,9 +90,7 @@ class BoxSearch {
         if (refuted_) break;
       }
     }
-    result_.validity = refuted_   ? CellValidity::invalid
-                       : decided_ ? CellValidity::valid
-                                  : CellValidity::undecided;
+    result_.validity = refuted_ ? CellValidity::invalid : decided_ ? CellValidity::valid : CellValidity::undecided;
     if (result_.validity != CellValidity::valid) result_.lower_bound = -kInfinity;
     if (result_.validity == CellValidity::valid) {
       result_.witness_determinant = 0;
@@ -126,8 +124,8 @@ class BoxSearch {
       int lowest_corner = 0;
       lowest = kInfinity;
       boxes_.with_matrices(box, [&](auto& matrices) {
-        bound = scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box), bounding,
-                                          boxes_.near_l(box));
+        bound =
+            scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box), bounding, boxes_.near_l(box));
         if (bound > 0) return;
         for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
           const double value = scale * matrices[boxes_.corner_matrix(box, corner)].determinant();

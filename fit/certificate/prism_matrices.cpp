@@ -18,8 +18,8 @@ struct PrismMatrices::Triangle {
   };
   explicit Triangle(int degree);
 
-  std::vector<Neighbors> neighbors;          ///< by alpha; alpha itself if there is none, and the exponent is 0
-  std::array<std::vector<int>, 3> edges;     ///< the alpha with alpha_c = 0
+  std::vector<Neighbors> neighbors;       ///< by alpha; alpha itself if there is none, and the exponent is 0
+  std::array<std::vector<int>, 3> edges;  ///< the alpha with alpha_c = 0
   std::array<std::size_t, 3> corners;
   int middle;
 };
@@ -73,8 +73,7 @@ void PrismMatrices::resize(int degree) {
 }
 
 template <class Lanes>
-void PrismMatrices::load(const std::array<std::vector<Lanes>, 3>& x, std::size_t first,
-                         MatrixOf<Lanes>& result) const {
+void PrismMatrices::load(const std::array<std::vector<Lanes>, 3>& x, std::size_t first, MatrixOf<Lanes>& result) const {
   using Number = NumberOf<Lanes>;
   constexpr Lanes kLowW{0, 1, 2, 3, 4, 5, 6, 7}, kHighW = kWide - 1 - kLowW;
   const std::size_t n = first / kWide;

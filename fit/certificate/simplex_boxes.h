@@ -30,15 +30,15 @@ class SimplexBoxes {
     Vec3 largest_coefficient = Vec3::Zero(), rounding = Vec3::Zero();
   };
   struct Box {
-    int level = 0;                    ///< number of bisections
-    std::array<Vec3, 4> vertices{};   ///< of the simplex, in canonical coordinates; a prism's triangle has w = 0
-    int halvings = 0;                 ///< bisections of the simplex
-    std::uint32_t part = 1;           ///< number of the simplex, as in `SimplexModels`
-    int w_level = 0, w_index = 0;     ///< position along w, of a prism
-    int tier = -1;                    ///< tier of the models that `control` comes from; -1: none is accurate enough
-    int modeled = 0;                  ///< bisections of the simplex that these models are made for
+    int level = 0;                   ///< number of bisections
+    std::array<Vec3, 4> vertices{};  ///< of the simplex, in canonical coordinates; a prism's triangle has w = 0
+    int halvings = 0;                ///< bisections of the simplex
+    std::uint32_t part = 1;          ///< number of the simplex, as in `SimplexModels`
+    int w_level = 0, w_index = 0;    ///< position along w, of a prism
+    int tier = -1;                   ///< tier of the models that `control` comes from; -1: none is accurate enough
+    int modeled = 0;                 ///< bisections of the simplex that these models are made for
     std::shared_ptr<const std::vector<Layer>> layers;  ///< bounds and errors of these models
-    AlignedDoubles control;           ///< control points: at alpha lanes_ + row num_layers_ + k
+    AlignedDoubles control;                            ///< control points: at alpha lanes_ + row num_layers_ + k
   };
   // Three bisections halve all edges. At the greatest depth, these have 1e-6 of their length.
   static constexpr int kLevelsPerDepth = 3, kMostSimplexDepth = 20;
@@ -113,10 +113,10 @@ class SimplexBoxes {
  protected:
   const LineModels& line_;  // along w
   int num_layers_;
-  std::size_t lanes_;       // numbers per control point: a multiple of SimplexTables::kControlPointLanes
+  std::size_t lanes_;  // numbers per control point: a multiple of SimplexTables::kControlPointLanes
 
  private:
-  double small_error_;      // default for the errors of models, relative to the mean edges
+  double small_error_;               // default for the errors of models, relative to the mean edges
   int num_modes_ = 0, highest_ = 0;  // number of nonzero coefficients, and their highest order i + j + k
   struct Term {
     std::size_t slot;  // of the function, in the models of a part
@@ -132,11 +132,11 @@ class SimplexBoxes {
     std::size_t number;
     Eigen::RowVector3d gradient;  // approximate mean
   };
-  std::span<const LocalMode> of_modes_;         // the modes that the next two are made for
-  std::vector<Place> places_;                   // layer, slot and order of each mode
+  std::span<const LocalMode> of_modes_;  // the modes that the next two are made for
+  std::vector<Place> places_;            // layer, slot and order of each mode
   std::vector<LinearMode> linear_modes_;
-  std::vector<std::vector<Term>> layer_terms_;  // by the number of N_k along w; a tet's are all in one layer
-  Vec3 mean_edges_;                             // lengths of the linear part's mean columns
+  std::vector<std::vector<Term>> layer_terms_;        // by the number of N_k along w; a tet's are all in one layer
+  Vec3 mean_edges_;                                   // lengths of the linear part's mean columns
   std::shared_ptr<const SimplexModels::Part> whole_;  // data of the whole simplex, once requested
   std::vector<SimplexModels::Models> whole_models_;   // models of the whole simplex, by tier
   std::vector<Weighted> used_;                        // scratch memory of take_models

@@ -43,7 +43,7 @@ class SimplexModels {
   /// Data of the functions over a part that need no models; all by slot.
   struct Part {
     struct Function {
-      double value_bound, gradient_bound;  ///< of the function itself
+      double value_bound, gradient_bound;                                ///< of the function itself
       bool is_left_out(int tier) const { return left_out >> tier & 1; }  ///< true if its model is 0
       std::uint8_t left_out;
     };
@@ -119,11 +119,11 @@ class SimplexModels {
   std::vector<const SimplexTables*> tiers_;
   int most_halvings_;
   ChebyshevExpansion expansion_;
-  std::vector<LocalMode> modes_;              // by slot
+  std::vector<LocalMode> modes_;                          // by slot
   std::array<std::size_t, kMaxOrder + 1> first_slots_{};  // of each order
-  std::vector<int> slots_;                    // by slot_address
-  mutable std::mutex mutex_, making_;         // guards what is stored; serializes making it
-  mutable std::map<std::uint32_t, Stored> stored_;  // by number
+  std::vector<int> slots_;                                // by slot_address
+  mutable std::mutex mutex_, making_;                     // guards what is stored; serializes making it
+  mutable std::map<std::uint32_t, Stored> stored_;        // by number
   mutable std::size_t stored_bytes_ = 0;
 };
 

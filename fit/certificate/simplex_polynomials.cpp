@@ -112,8 +112,7 @@ SimplexPolynomial SimplexPolynomial::combined(double weight_a, const SimplexPoly
                                               const SimplexPolynomial& b) {
   assert(a.degree_ == b.degree_);
   SimplexPolynomial result = zero(a.dimension_, a.degree_);
-  for (std::size_t m = 0; m < a.terms_.size(); ++m)
-    result.terms_[m] = weight_a * a.terms_[m] + weight_b * b.terms_[m];
+  for (std::size_t m = 0; m < a.terms_.size(); ++m) result.terms_[m] = weight_a * a.terms_[m] + weight_b * b.terms_[m];
   const double size_a = std::abs(weight_a), size_b = std::abs(weight_b);
   result.rounding_ = 1.0001 * (size_a * (a.rounding_ + 2 * kDoubleRoundoff * a.bound_) +
                                size_b * (b.rounding_ + 2 * kDoubleRoundoff * b.bound_));
@@ -158,9 +157,8 @@ void SimplexPolynomial::add_shifted(double weight, const SimplexPolynomial& q, i
 }
 
 void SimplexPolynomial::bernstein(double* coefficients) const {
-  for_each_term(dimension_, degree_, [&](int e1, int e2, int e3, double share) {
-    *coefficients++ = at(e1, e2, e3) * share;
-  });
+  for_each_term(dimension_, degree_,
+                [&](int e1, int e2, int e3, double share) { *coefficients++ = at(e1, e2, e3) * share; });
 }
 
 }  // namespace subvol::internal

@@ -20,7 +20,7 @@ class SimplexTables {
   static const SimplexTables& get(int dimension, int degree);
 
   SimplexIndex index, lower;  ///< of the degree, and of one less
-  std::size_t stride;        ///< a multiple of kWide, at least index.size()
+  std::size_t stride;         ///< a multiple of kWide, at least index.size()
   /// Per index of `lower`: with one exponent more; padded to kControlPointLanes.
   std::array<std::vector<int>, 4> raised;
 

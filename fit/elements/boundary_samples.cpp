@@ -17,7 +17,9 @@ namespace {
 class BoundarySampler {
  public:
   BoundarySampler(const ElementSpace& space, int intervals)
-      : space_(space), n_(intervals), vertex_samples_(space.num_vertices(), kNoIndex),
+      : space_(space),
+        n_(intervals),
+        vertex_samples_(space.num_vertices(), kNoIndex),
         edge_samples_(space.topology().num_edges(), kNoIndex) {}
 
   void add_faces(std::span<const Index> faces) {

@@ -22,9 +22,9 @@ struct BoundarySamples {
   std::vector<CellPoint> points;  ///< location of each sample, in one of the cells that contain it
   SparseMap positions;            ///< nodes -> samples
   std::vector<std::array<Index, 3>> triangles;
-  std::vector<Index> triangle_faces;             ///< boundary face of each triangle, as MeshTopology numbers it
-  std::vector<std::uint8_t> at_edges;            ///< per triangle: 1 if a corner is on an edge of its face
-  std::vector<std::array<Index, 2>> crease_edges;///< `intervals` per crease, in their order, from v0 to v1
+  std::vector<Index> triangle_faces;               ///< boundary face of each triangle, as MeshTopology numbers it
+  std::vector<std::uint8_t> at_edges;              ///< per triangle: 1 if a corner is on an edge of its face
+  std::vector<std::array<Index, 2>> crease_edges;  ///< `intervals` per crease, in their order, from v0 to v1
 };
 
 /// intervals  number of intervals along every edge, >= 1; should be points_for_order(p) - 1 or more for order p.

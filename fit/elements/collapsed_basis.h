@@ -29,8 +29,8 @@ struct CollapsedBasis {
     std::size_t c;  ///< where the values of C begin
     std::vector<Row> rows;
   };
-  int degree = -1;             ///< -1: there are no points
-  std::vector<double> a, b, c; ///< values of all A_i, B_ij and C_sk at a point, then at the next
+  int degree = -1;              ///< -1: there are no points
+  std::vector<double> a, b, c;  ///< values of all A_i, B_ij and C_sk at a point, then at the next
   std::vector<Layer> layers;
 
   CollapsedBasis() = default;

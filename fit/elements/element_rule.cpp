@@ -16,18 +16,20 @@ namespace {
 std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
   const double u = p[0], v = p[1], w = p[2];
   switch (kind) {
-    case CellKind::tet:
-      return {Vec3(-1, -1, -1), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+    case CellKind::tet: return {Vec3(-1, -1, -1), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
     case CellKind::prism: {
       const double t = 1 - u - v;
-      return {Vec3(-(1 - w), -(1 - w), -t), Vec3(1 - w, 0, -u), Vec3(0, 1 - w, -v),
-              Vec3(-w, -w, t),              Vec3(w, 0, u),      Vec3(0, w, v)};
+      return {Vec3(-(1 - w), -(1 - w), -t),
+              Vec3(1 - w, 0, -u),
+              Vec3(0, 1 - w, -v),
+              Vec3(-w, -w, t),
+              Vec3(w, 0, u),
+              Vec3(0, w, v)};
     }
     case CellKind::pyramid:  // at the base, w = 0: the gradients are the same along each ray to the apex
       return {Vec3(v - 1, u - 1, u * v - 1), Vec3(1 - v, -u, -u * v), Vec3(v, u, u * v), Vec3(-v, 1 - u, -u * v),
               Vec3(0, 0, 1)};
-    case CellKind::hex:
-      break;
+    case CellKind::hex: break;
   }
   const double a = 1 - u, b = 1 - v, c = 1 - w;
   return {Vec3(-b * c, -a * c, -a * b), Vec3(b * c, -u * c, -u * b), Vec3(v * c, u * c, -u * v),

@@ -24,11 +24,11 @@ namespace subvol::internal {
 /// Only the vertices whose shape function has a nonzero gradient at a point are listed: 4 of 8 at a hex's corner.
 struct ElementRule {
   struct Entry {
-    std::int8_t vertex;          ///< local vertex number
+    std::int8_t vertex;              ///< local vertex number
     std::array<double, 3> gradient;  ///< in ideal coordinates, for h = 1
   };
   CellKind kind;
-  std::vector<Vec3> points;          ///< canonical coordinates
+  std::vector<Vec3> points;  ///< canonical coordinates
   std::vector<double> weights;
   std::vector<std::size_t> offsets;  ///< weights.size() + 1 entries into `entries`
   std::vector<Entry> entries;

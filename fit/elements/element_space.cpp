@@ -133,11 +133,12 @@ ElementSpace::ElementSpace(std::shared_ptr<const Cells> cells, Basis basis, cons
 ElementSpace::ElementSpace(const VolumeMesh& mesh, Basis basis, const EntityOrders& orders)
     : ElementSpace(std::make_shared<const Cells>(mesh), basis, orders) {}
 
-ElementSpace::ElementSpace(const VolumeMesh& mesh, Basis basis, int order) : ElementSpace([&] {
-  auto cells = std::make_shared<const Cells>(mesh);
-  const EntityOrders orders = EntityOrders::uniform(cells->topology, order);
-  return ElementSpace(std::move(cells), basis, orders);
-}()) {}
+ElementSpace::ElementSpace(const VolumeMesh& mesh, Basis basis, int order)
+    : ElementSpace([&] {
+        auto cells = std::make_shared<const Cells>(mesh);
+        const EntityOrders orders = EntityOrders::uniform(cells->topology, order);
+        return ElementSpace(std::move(cells), basis, orders);
+      }()) {}
 
 ElementSpace ElementSpace::with_orders(const EntityOrders& orders) const {
   return ElementSpace(cells_, basis_, orders);
@@ -157,9 +158,8 @@ void ElementSpace::number_nodes() {
                                 [&](std::size_t e) { return num_modes(EntityShape::edge, orders_.edges[e]); });
   face_nodes_ = number_entities(edge_nodes_.back(), mesh.num_faces(),
                                 [&](std::size_t f) { return num_modes(face_shape(f), orders_.faces[f]); });
-  cell_nodes_ = number_entities(face_nodes_.back(), mesh.num_cells(), [&](std::size_t c) {
-    return num_modes(entity_shape(kind(c)), orders_.cells[c]);
-  });
+  cell_nodes_ = number_entities(face_nodes_.back(), mesh.num_cells(),
+                                [&](std::size_t c) { return num_modes(entity_shape(kind(c)), orders_.cells[c]); });
   if (num_nodes() > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
     throw InputError("ElementSpace: " + std::to_string(num_nodes()) + " nodes are more than an index can tell");
 }
@@ -207,8 +207,7 @@ void ElementSpace::list_cell_modes() {
     node = cell_nodes_[c];
     for_each_mode(entity_shape(cell_kind), orders_.cells[c], [&](ModeIndex m) { add({cell_mode(cell_kind, m)}); });
 
-    std::sort(entries.begin(), entries.end(),
-              [](const CellEntry& x, const CellEntry& y) { return x.mode < y.mode; });
+    std::sort(entries.begin(), entries.end(), [](const CellEntry& x, const CellEntry& y) { return x.mode < y.mode; });
     modes.clear();
     for (const CellEntry& entry : entries) {
       modes.push_back(entry.mode);
@@ -229,14 +228,13 @@ void ElementSpace::list_cell_modes() {
 
 std::vector<Index> node_numbers_in(const ElementSpace& to, const ElementSpace& from) {
   const MeshTopology& mesh = from.topology();
-  const bool same_cells =
-      &mesh == &to.topology() ||
-      (from.num_cells() == to.num_cells() && from.num_vertices() == to.num_vertices() &&
-       [&] {
-         for (std::size_t c = 0; c < from.num_cells(); ++c)
-           if (from.kind(c) != to.kind(c) || !std::ranges::equal(from.vertices(c), to.vertices(c))) return false;
-         return true;
-       }());
+  const bool same_cells = &mesh == &to.topology() ||
+                          (from.num_cells() == to.num_cells() && from.num_vertices() == to.num_vertices() && [&] {
+                            for (std::size_t c = 0; c < from.num_cells(); ++c)
+                              if (from.kind(c) != to.kind(c) || !std::ranges::equal(from.vertices(c), to.vertices(c)))
+                                return false;
+                            return true;
+                          }());
   if (!same_cells || from.basis() != to.basis())
     throw InputError("node_numbers_in: the spaces differ in their cells or their basis");
 

@@ -43,8 +43,7 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
   return sums.cwiseQuotient(counts);
 }
 
-std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
-                              double own_share) {
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, double own_share) {
   constexpr double kLeastBoxLengthShare = 1e-3;  // of the common length: a collapsed edge must not make a box flat
   double ideal_volumes = 0;
   for (CellKind kind : mesh.kinds) ideal_volumes += ideal_volume(kind);

@@ -85,15 +85,14 @@ class Projector {
  private:
   Vec3 asked(std::size_t c, const Vec3& point) const {
     Vec3 x = map_(c, point);
-    if (!x.allFinite())
-      throw InputError("project_map: the map is not finite at a point of cell " + std::to_string(c));
+    if (!x.allFinite()) throw InputError("project_map: the map is not finite at a point of cell " + std::to_string(c));
     return x;
   }
 
   const Vec3& corner(std::size_t c, Index vertex) const {
     const auto vertices = mesh_.space.vertices(c);
-    return canonical_vertices(mesh_.space.kind(c))[std::find(vertices.begin(), vertices.end(), vertex) -
-                                                   vertices.begin()];
+    return canonical_vertices(
+        mesh_.space.kind(c))[std::find(vertices.begin(), vertices.end(), vertex) - vertices.begin()];
   }
 
   void fit_edge(std::size_t c, Index e) {
@@ -124,8 +123,7 @@ class Projector {
       case EntityShape::tet: dimensions = {3}; break;
       case EntityShape::prism: dimensions = {2, 1}; break;
       case EntityShape::hex: dimensions = {1, 1, 1}; break;
-      case EntityShape::pyramid:
-        return;  // it has no modes
+      case EntityShape::pyramid: return;  // it has no modes
     }
     std::vector<Vec3> points = {Vec3::Zero()};  // the first simplex varies fastest
     int axis = 0;

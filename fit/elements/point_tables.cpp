@@ -49,8 +49,7 @@ bool has_factor(CellKind kind, const LocalMode& mode, int c) {
 }
 
 bool vanishes_on(CellKind kind, const LocalMode& mode, int side) {
-  if (kind == CellKind::hex)
-    return vanishes_at_end(side < 2 ? mode.i : side < 4 ? mode.j : mode.k, side % 2 == 1);
+  if (kind == CellKind::hex) return vanishes_at_end(side < 2 ? mode.i : side < 4 ? mode.j : mode.k, side % 2 == 1);
   if (kind == CellKind::prism && side > 2) return vanishes_at_end(mode.k, side == 4);
   return has_factor(kind, mode, side);
 }

@@ -67,8 +67,7 @@ int order_of_mode(EntityShape shape, const ModeIndex& m) {
     case EntityShape::tet: return m.i + m.j + m.k + 1;
     case EntityShape::prism: return std::max(m.i + m.j, m.k) + 1;
     case EntityShape::hex:
-    case EntityShape::pyramid:
-      break;
+    case EntityShape::pyramid: break;
   }
   return std::max({m.i, m.j, m.k}) + 1;
 }
@@ -82,8 +81,7 @@ double largest_value(EntityShape shape, const ModeIndex& m) {
     case EntityShape::triangle: return largest_mode(m.i) * largest_vertex_factor(m.j);
     case EntityShape::prism: return largest_mode(m.i) * largest_vertex_factor(m.j) * largest_mode(m.k);
     case EntityShape::tet:
-    case EntityShape::pyramid:
-      break;
+    case EntityShape::pyramid: break;
   }
   return largest_mode(m.i) * largest_vertex_factor(m.j) * largest_vertex_factor(m.k);
 }

@@ -149,10 +149,12 @@ LineRule gauss_lobatto_rule(int n) {
     // Zeros of (1 - t^2) P_m', m = n - 1: its derivative is -m (m + 1) P_m.
     const int m = n - 1;
     const double start = std::cos(std::numbers::pi * i / m);
-    const double t = i == 0 ? 1 : i == m ? -1 : refine(start, [&](double x) {
-      const auto [value, old] = legendre(m, x);
-      return (x * value - old) / ((m + 1) * value);
-    });
+    const double t = i == 0   ? 1
+                     : i == m ? -1
+                              : refine(start, [&](double x) {
+                                  const auto [value, old] = legendre(m, x);
+                                  return (x * value - old) / ((m + 1) * value);
+                                });
     const double value = legendre(m, t)[0];
     rule.points.push_back((1 + t) / 2);
     rule.weights.push_back(1 / (n * m * value * value));

@@ -38,8 +38,9 @@ int axis_between(const Vec3& a, const Vec3& b, bool& forward) {
 void set_axis_mode(SignedMode& signed_mode, const Vec3& a, const Vec3& b, int i) {
   bool forward;
   const int axis = axis_between(a, b, forward);
-  (axis == 0 ? signed_mode.mode.i : axis == 1 ? signed_mode.mode.j : signed_mode.mode.k) =
-      static_cast<std::uint8_t>(i + 1);
+  (axis == 0   ? signed_mode.mode.i
+   : axis == 1 ? signed_mode.mode.j
+               : signed_mode.mode.k) = static_cast<std::uint8_t>(i + 1);
   signed_mode.sign *= sign_of(forward, i);
 }
 
@@ -67,14 +68,10 @@ std::span<const Vec3> canonical_vertices(CellKind kind) {
   static const std::array<Vec3, 5> pyramid = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0),
                                               Vec3(0, 0, 1)};
   switch (kind) {
-    case CellKind::tet:
-      return tet;
-    case CellKind::prism:
-      return prism;
-    case CellKind::pyramid:
-      return pyramid;
-    case CellKind::hex:
-      break;
+    case CellKind::tet: return tet;
+    case CellKind::prism: return prism;
+    case CellKind::pyramid: return pyramid;
+    case CellKind::hex: break;
   }
   return hex;
 }
@@ -93,8 +90,7 @@ int num_modes(EntityShape shape, int order) {
     case EntityShape::quad: return n * n;
     case EntityShape::tet: return n * (n - 1) * (n - 2) / 6;
     case EntityShape::prism: return n * n * (n - 1) / 2;
-    case EntityShape::pyramid:
-      return 0;
+    case EntityShape::pyramid: return 0;
     case EntityShape::hex: break;
   }
   return n * n * n;
@@ -124,8 +120,7 @@ SignedMode edge_mode(CellKind kind, int a, int b, int i) {
     set_prism_mode(result, a, b, i);
   } else {
     bool forward;
-    result.mode = {.edge = static_cast<std::int8_t>(find_edge(kind, a, b, forward)),
-                   .i = static_cast<std::uint8_t>(i)};
+    result.mode = {.edge = static_cast<std::int8_t>(find_edge(kind, a, b, forward)), .i = static_cast<std::uint8_t>(i)};
     result.sign = sign_of(forward, i);
   }
   return result;
@@ -206,8 +201,7 @@ void ShapeFunctions::set_point(const Vec3& point) {
     const Vec3 slope = 0.5 * (l[b].gradient - l[a].gradient);
     const Factor ends = product(l[a], l[b]);
     mode_kernels(basis_, max_order_, 0.5 * (1 + l[b].value - l[a].value), values.data(), derivatives.data());
-    for (int i = 1; i < max_order_; ++i)
-      edges_[e][i] = product(ends, {values[i - 1], derivatives[i - 1] * slope});
+    for (int i = 1; i < max_order_; ++i) edges_[e][i] = product(ends, {values[i - 1], derivatives[i - 1] * slope});
   }
 }
 

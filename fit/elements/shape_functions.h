@@ -89,8 +89,7 @@ class ShapeFunctions {
   /// its axis.
   void set_point(const Vec3& point);
   double value(const LocalMode& mode) const {
-    if (kind_ == CellKind::hex)
-      return axes_[0][mode.i].value * axes_[1][mode.j].value * axes_[2][mode.k].value;
+    if (kind_ == CellKind::hex) return axes_[0][mode.i].value * axes_[1][mode.j].value * axes_[2][mode.k].value;
     double result = mode.edge >= 0 ? edges_[mode.edge][mode.i].value : 1;
     if (mode.vertex >= 0) result *= vertices_[mode.vertex][mode.j].value;
     if (kind_ == CellKind::prism) return result * axes_[2][mode.k].value;

@@ -37,13 +37,13 @@ struct CellGroup {
   std::vector<int> active;                             ///< number of cells in each batch without padding
   std::vector<Index> nodes;                            ///< by batch, mode, lane; kNoIndex: the cell has no such mode
   std::vector<std::int8_t> signs;
-  std::size_t local_begin = 0;                         ///< where this group begins in the energy's `local_`
-  std::vector<Wide> to_reference;  ///< A^-1: 9 per batch; if `by_point`, 9 per batch and point
-  std::vector<Wide> point_weights;                     ///< one per batch and point; empty: all 1
+  std::size_t local_begin = 0;      ///< where this group begins in the energy's `local_`
+  std::vector<Wide> to_reference;   ///< A^-1: 9 per batch; if `by_point`, 9 per batch and point
+  std::vector<Wide> point_weights;  ///< one per batch and point; empty: all 1
   bool by_point = false;
-  std::vector<Narrow> frozen;                          ///< `frozen_size` entries per batch and point
-  std::vector<Narrow> frozen_hinges;                   ///< 9 per batch and point; empty: there is no hinge
-  std::vector<Wide> mean_blocks;                       ///< 54 per batch: sum of `add_blocks` over its points
+  std::vector<Narrow> frozen;         ///< `frozen_size` entries per batch and point
+  std::vector<Narrow> frozen_hinges;  ///< 9 per batch and point; empty: there is no hinge
+  std::vector<Wide> mean_blocks;      ///< 54 per batch: sum of `add_blocks` over its points
 
   std::size_t num_points() const { return weights.size(); }
   /// Weight of point q in the mean over each cell of the batch.

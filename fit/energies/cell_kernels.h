@@ -40,8 +40,7 @@ inline void multiply_lanes_transposed(double (*m)[kSimdLanes], const double (*b)
 #pragma omp simd
     for (int l = 0; l < kSimdLanes; ++l) {
       const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
-      for (int c = 0; c < 3; ++c)
-        m[3 * r + c][l] = m0 * b[3 * c][l] + m1 * b[3 * c + 1][l] + m2 * b[3 * c + 2][l];
+      for (int c = 0; c < 3; ++c) m[3 * r + c][l] = m0 * b[3 * c][l] + m1 * b[3 * c + 1][l] + m2 * b[3 * c + 2][l];
     }
 }
 
@@ -71,7 +70,7 @@ void add_point_hessian(std::span<const ElementRule::Entry> entries, const Distor
                      batch.v[6 + i][l] * inverse_h[2][l] * entries[a].gradient[2];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (std::size_t b = a; b < entries.size(); ++b) {
-      double (*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
+      double(*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
 #pragma omp simd
       for (int l = 0; l < kSimdLanes; ++l) {
         const double p00 = w[a][0][l] * w[b][0][l], p11 = w[a][1][l] * w[b][1][l], p22 = w[a][2][l] * w[b][2][l];
@@ -110,10 +109,9 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
     for (int r = 0; r < 3; ++r)
 #pragma omp simd
       for (int l = 0; l < kSimdLanes; ++l)
-        g[entry.vertex][r][l] +=
-            factor[0][l] * stress[3 * r][l] * entry.gradient[0] +
-            factor[1][l] * stress[3 * r + 1][l] * entry.gradient[1] +
-            factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
+        g[entry.vertex][r][l] += factor[0][l] * stress[3 * r][l] * entry.gradient[0] +
+                                 factor[1][l] * stress[3 * r + 1][l] * entry.gradient[1] +
+                                 factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
 }
 
 /// Evaluates one of the distortions at kDistortionPointsAtOnce points.
@@ -178,13 +176,12 @@ struct RegularizedKernel {
     }
     for (std::size_t a = 0; a < entries.size(); ++a)
       for (std::size_t b = a; b < entries.size(); ++b) {
-        double (*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
+        double(*block)[kSimdLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
 #pragma omp simd
         for (int l = 0; l < kSimdLanes; ++l) {
           const double f = weight[l], beta = f * batch.beta[l], gamma = f * batch.gamma[l];
           const double alpha =
-              f * batch.alpha[l] *
-              (w[a][0][l] * w[b][0][l] + w[a][1][l] * w[b][1][l] + w[a][2][l] * w[b][2][l]);
+              f * batch.alpha[l] * (w[a][0][l] * w[b][0][l] + w[a][1][l] * w[b][1][l] + w[a][2][l] * w[b][2][l]);
           for (int r = 0; r < 3; ++r) {
             const double by_c = beta * jw[a][r][l] + gamma * cw[a][r][l], by_j = beta * cw[a][r][l];
             for (int c = 0; c < 3; ++c) block[3 * r + c][l] += by_c * cw[b][c][l] + by_j * jw[b][c][l];

@@ -179,9 +179,9 @@ class CellSweep {
 
   const CellGroup& group_;
   int m_, n_;
-  std::vector<Wide> coefficients_, sums_;  // sums_: prism, tet
-  std::vector<Wide> layer_, layer_sums_;   // prism, collapsed tet
-  std::vector<Wide> expansion_, expansion_sums_, row_;  // collapsed tet
+  std::vector<Wide> coefficients_, sums_;                // sums_: prism, tet
+  std::vector<Wide> layer_, layer_sums_;                 // prism, collapsed tet
+  std::vector<Wide> expansion_, expansion_sums_, row_;   // collapsed tet
   std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not initialized with zeros
   std::unique_ptr<Wide[][9]> points_;                    // hex, collapsed tet
 };

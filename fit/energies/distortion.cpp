@@ -30,8 +30,13 @@ using WideBits = std::int64_t __attribute__((vector_size(kWide * sizeof(std::int
   const Wide k = (Wide)((WideBits)wide(kIntegerToDoubleOffset) + (exponent_bits >> 52)) - kIntegerToDoubleOffset;
   const Wide s = (m - 1) * reciprocal(m + 1), s2 = s * s;
   const Wide series =
-      1 + s2 * (1.0 / 3 + s2 * (1.0 / 5 + s2 * (1.0 / 7 + s2 * (1.0 / 9 + s2 * (1.0 / 11 + s2 * (1.0 / 13 + s2 * (1.0 /
-      15 + s2 * (1.0 / 17 + s2 * (1.0 / 19)))))))));
+      1 +
+      s2 *
+          (1.0 / 3 +
+           s2 * (1.0 / 5 +
+                 s2 * (1.0 / 7 +
+                       s2 * (1.0 / 9 + s2 * (1.0 / 11 +
+                                             s2 * (1.0 / 13 + s2 * (1.0 / 15 + s2 * (1.0 / 17 + s2 * (1.0 / 19)))))))));
   return 2 * s * series + k * 0.6931471805599453;
 }
 

@@ -45,7 +45,7 @@ struct DistortionKernels {
   void (*energy)(DistortionBatch* batches, int count);    ///< `energy`
   void (*gradient)(DistortionBatch* batches, int count);  ///< also `stress`
   void (*hessian)(DistortionBatch* batches, int count);   ///< everything
-  bool coupled;                    ///< true if stretches are coupled
+  bool coupled;                                           ///< true if stretches are coupled
 };
 const DistortionKernels& kernels_of(Distortion distortion);
 

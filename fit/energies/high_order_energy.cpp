@@ -11,8 +11,8 @@
 #include "subvol/fit/energies/regularized_barrier.h"
 #include "subvol/fit/energies/step_limit.h"
 
-#include <Eigen/LU>
 #include <omp.h>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <atomic>
@@ -226,46 +226,46 @@ double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel
                                        const PerPoint& per_point) const {
   constexpr int kDistortionPointsAtOnce = 2;  // the rotation of one need not wait for that of the other
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
-    const CellGroup& group = groups_[g];
-    const double hinge = hinge_weight_at(group);
-    DistortionBatch batches[kDistortionPointsAtOnce];
-    for (DistortionBatch& batch : batches) batch.floor = floor_;
-    Wide sum{};
-    const auto evaluate = [&](std::size_t first, int count, Wide (*j)[9]) {
-      Wide f[9];
-      for (int n = 0; n < count; ++n) {
-        product(j[n], group.reference(b, first + n), f);
-        for (int e = 0; e < 9; ++e) store_wide(f[e], batches[n].jacobian[e]);
-      }
-      kernel(batches, count);
-      for (int n = 0; n < count; ++n) {
-        const std::size_t q = first + n;
-        const Wide weight = group.weight(b, q);
-        sum += weight * load_wide(batches[n].energy);
-        if constexpr (kBack)
-          for (int e = 0; e < 9; ++e) f[e] = weight * load_wide(batches[n].stress[e]);
-        if (hinge > 0) {
-          const JacobianHinge at = hinge_of(batches[n], hinge_threshold_);
-          sum += hinge * at.below * at.below;
-          if constexpr (kBack)
-            for (int e = 0; e < 9; ++e) f[e] += 2 * hinge * at.below * at.slope[e];
-        }
-        if constexpr (kBack) {
-          product_with_transpose(f, group.reference(b, q), j[n]);
-        }
-        per_point(g, b, q, batches[n]);
-      }
-    };
-    sweep.load(b, nodes);
-    sweep.template run<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
-      for (int n = 0; n < count; n += kDistortionPointsAtOnce)
-        evaluate(first + n, std::min(kDistortionPointsAtOnce, count - n), j + n);
-    });
-    if constexpr (kBack) keep(group, b, sweep.coefficients());
-    double total = 0;
-    for (int l = 0; l < group.active[b]; ++l) total += sum[l];
-    return total;
-  });
+           const CellGroup& group = groups_[g];
+           const double hinge = hinge_weight_at(group);
+           DistortionBatch batches[kDistortionPointsAtOnce];
+           for (DistortionBatch& batch : batches) batch.floor = floor_;
+           Wide sum{};
+           const auto evaluate = [&](std::size_t first, int count, Wide(*j)[9]) {
+             Wide f[9];
+             for (int n = 0; n < count; ++n) {
+               product(j[n], group.reference(b, first + n), f);
+               for (int e = 0; e < 9; ++e) store_wide(f[e], batches[n].jacobian[e]);
+             }
+             kernel(batches, count);
+             for (int n = 0; n < count; ++n) {
+               const std::size_t q = first + n;
+               const Wide weight = group.weight(b, q);
+               sum += weight * load_wide(batches[n].energy);
+               if constexpr (kBack)
+                 for (int e = 0; e < 9; ++e) f[e] = weight * load_wide(batches[n].stress[e]);
+               if (hinge > 0) {
+                 const JacobianHinge at = hinge_of(batches[n], hinge_threshold_);
+                 sum += hinge * at.below * at.below;
+                 if constexpr (kBack)
+                   for (int e = 0; e < 9; ++e) f[e] += 2 * hinge * at.below * at.slope[e];
+               }
+               if constexpr (kBack) {
+                 product_with_transpose(f, group.reference(b, q), j[n]);
+               }
+               per_point(g, b, q, batches[n]);
+             }
+           };
+           sweep.load(b, nodes);
+           sweep.template run<kBack>([&](std::size_t first, int count, Wide(*j)[9]) {
+             for (int n = 0; n < count; n += kDistortionPointsAtOnce)
+               evaluate(first + n, std::min(kDistortionPointsAtOnce, count - n), j + n);
+           });
+           if constexpr (kBack) keep(group, b, sweep.coefficients());
+           double total = 0;
+           for (int l = 0; l < group.active[b]; ++l) total += sum[l];
+           return total;
+         });
 }
 
 /// Does so with the present distortion or the regularized barrier.
@@ -401,11 +401,10 @@ void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const
     const CellGroup& group = groups_[g];
     std::vector<Wide>& kept = jacobians[omp_get_thread_num()];
     sweep.load(b, nodes);
-    sweep.run<false>([&](std::size_t first, int count, const Wide (*j)[9]) {
-      std::copy_n(j[0], 9 * count, &kept[9 * first]);
-    });
+    sweep.run<false>(
+        [&](std::size_t first, int count, const Wide(*j)[9]) { std::copy_n(j[0], 9 * count, &kept[9 * first]); });
     sweep.load(b, direction);
-    sweep.run<false>([&](std::size_t first, int count, const Wide (*d)[9]) {
+    sweep.run<false>([&](std::size_t first, int count, const Wide(*d)[9]) {
       for (int n = 0; n < count; ++n)
         for (int l = 0; l < group.active[b]; ++l) {
           Mat3 j, e;
@@ -423,9 +422,8 @@ void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const
 double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
   if (epsilon_ > 0) return limit;
   StepLimit steps(limit);
-  for_each_pair(nodes, direction, [&](std::size_t, std::size_t, std::size_t, int, const Mat3& j, const Mat3& d) {
-    steps.admit(j, d);
-  });
+  for_each_pair(nodes, direction,
+                [&](std::size_t, std::size_t, std::size_t, int, const Mat3& j, const Mat3& d) { steps.admit(j, d); });
   return steps.step();
 }
 

@@ -124,7 +124,7 @@ class HighOrderEnergy final : public RegularizedTerm {
 
   const ElementSpace* space_;
   QuadratureRule rule_;
-  double num_cells_;  ///< n
+  double num_cells_;                 ///< n
   std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell; empty with a `reference_`
   CellReference reference_;
   std::vector<int> points_;

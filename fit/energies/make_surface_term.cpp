@@ -13,7 +13,8 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                std::span<const std::uint8_t> refined, const SurfaceGroups& groups) {
   if (correspondence == Correspondence::voronoi) {
     if (!groups.of_target.empty())
-      throw InputError("Correspondence::voronoi: its cells know no regions; a template of several needs closest points");
+      throw InputError(
+          "Correspondence::voronoi: its cells know no regions; a template of several needs closest points");
     return std::make_unique<SurfaceEnergy>(target, sample_triangles, num_samples, tangential_weight);
   }
   const int points = sample_triangles.size() > 2 * target.triangles().size() ? 1 : 3;

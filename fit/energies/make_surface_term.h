@@ -28,14 +28,10 @@ struct SurfaceGroups {
 /// refined     argument of `ClosestPointEnergy::refine`; empty: not called
 /// groups      only parts of the same group correspond. InputError: groups with Correspondence::voronoi, whose cells
 ///             know none.
-std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
-                                               const std::vector<std::array<Index, 3>>& sample_triangles,
-                                               std::size_t num_samples, double tangential_weight,
-                                               Correspondence correspondence,
-                                               SurfacePull pull = SurfacePull::along_normals,
-                                               double far_length = 0,
-                                               std::span<const std::uint8_t> refined = {},
-                                               const SurfaceGroups& groups = {});
+std::unique_ptr<SurfaceTerm> make_surface_term(
+    const TargetSurface& target, const std::vector<std::array<Index, 3>>& sample_triangles, std::size_t num_samples,
+    double tangential_weight, Correspondence correspondence, SurfacePull pull = SurfacePull::along_normals,
+    double far_length = 0, std::span<const std::uint8_t> refined = {}, const SurfaceGroups& groups = {});
 
 /// Throws InputError unless correspondences are closest points: Voronoi cells of a point cloud have no area.
 void require_closest(Correspondence correspondence);

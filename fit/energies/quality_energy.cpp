@@ -145,8 +145,7 @@ QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengt
     throw InputError("QualityEnergy: lengths must hold one entry per cell (" + std::to_string(mesh.num_cells()) +
                      "), got " + std::to_string(lengths.size()));
   for (const Vec3& h : lengths)
-    if (!(h.minCoeff() > 0) || !h.allFinite())
-      throw InputError("QualityEnergy: lengths must be positive and finite");
+    if (!(h.minCoeff() > 0) || !h.allFinite()) throw InputError("QualityEnergy: lengths must be positive and finite");
   for (int kind = 0; kind < kNumCellKinds; ++kind)
     points_[kind] = {make_points(static_cast<CellKind>(kind), kQualityPointsPerDirection),
                      make_points(static_cast<CellKind>(kind), kDensePoints)};
@@ -404,8 +403,7 @@ void QualityEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& m
   internal::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
 }
 
-double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& points,
-                                            std::span<const Vec3> nodes) const {
+double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& points, std::span<const Vec3> nodes) const {
   const auto vertices = mesh_->cell(cell);
   std::array<Vec3, kMaxCellVertices> x;
   for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];

@@ -20,12 +20,12 @@ namespace subvol::internal {
 
 /// Weights of the terms of `QualityEnergy`. All are >= 0 and dimensionless.
 struct QualityWeights {
-  double cosine = 1;        ///< w_c: right angles, which is what the mean scaled Jacobian rises with
-  double hinge = 50;        ///< w_h: no scaled Jacobian below the threshold
-  double threshold = 0.3;   ///< t, at most 1: must lie well above the scaled Jacobian that is wanted
-  double edge = 20;         ///< w_e: no edge dies. The scaled Jacobian does not see lengths
-  double least_edge = 0.25; ///< rho, as a share of the wanted length
-  double twist = 0.3;       ///< w_p: faces are parallelograms
+  double cosine = 1;         ///< w_c: right angles, which is what the mean scaled Jacobian rises with
+  double hinge = 50;         ///< w_h: no scaled Jacobian below the threshold
+  double threshold = 0.3;    ///< t, at most 1: must lie well above the scaled Jacobian that is wanted
+  double edge = 20;          ///< w_e: no edge dies. The scaled Jacobian does not see lengths
+  double least_edge = 0.25;  ///< rho, as a share of the wanted length
+  double twist = 0.3;        ///< w_p: faces are parallelograms
 };
 
 /// A least-squares energy that raises the scaled Jacobians of linear cells, the lowest ones most.
@@ -77,9 +77,9 @@ class QualityEnergy final : public VolumeTerm {
 
   /// State of the cells against a goal.
   struct State {
-    double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
-    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; at
-                             ///< most 1, and at least -1 but at folds
+    double least = 1;           ///< least scaled Jacobian at the points of all cells; 1 without cells
+    double least_share = 1;     ///< least share of the goal, or of the lower goal at caps, that a point has reached; at
+                                ///< most 1, and at least -1 but at folds
     std::vector<Index> poor{};  ///< cells with a point below its goal, or at a fold, ascending
     std::vector<double> shares{};  ///< least share of each of these
   };
@@ -118,9 +118,9 @@ class QualityEnergy final : public VolumeTerm {
   /// The points of one kind of cell.
   struct Points {
     ElementRule rule;
-    std::vector<int> corner;        ///< local vertex of each point that is a corner; -1 for the others
-    std::vector<int> edge;          ///< local edge of each point inside one; -1 for the others
-    std::vector<double> weights;    ///< a_q
+    std::vector<int> corner;      ///< local vertex of each point that is a corner; -1 for the others
+    std::vector<int> edge;        ///< local edge of each point inside one; -1 for the others
+    std::vector<double> weights;  ///< a_q
     PointJacobians jacobians;
   };
   struct CellSums;
@@ -136,7 +136,8 @@ class QualityEnergy final : public VolumeTerm {
   template <bool kDerivatives>
   double evaluate(std::size_t cell, std::span<const Vec3> nodes, CellSums& sums) const;
   template <bool kHessian>
-  double add_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse* hessian) const;
+  double add_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                         BlockSparse* hessian) const;
   double least_scaled_jacobian(std::size_t cell, const Points& points, std::span<const Vec3> nodes) const;
   double fold_weight(std::size_t edge) const { return weights_.hinge * fold_emphasis_[edge]; }
   double add_fold_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
@@ -152,14 +153,14 @@ class QualityEnergy final : public VolumeTerm {
     std::array<double, kMaxCellVertices> corners;
     std::array<double, kMaxCellEdges> edges;
   };
-  std::vector<Index> caps_of_cell_;                          ///< place in caps_, or kNoIndex; empty: no caps
+  std::vector<Index> caps_of_cell_;  ///< place in caps_, or kNoIndex; empty: no caps
   std::vector<CellCaps> caps_;
-  std::vector<double> corner_emphasis_, cell_emphasis_;      ///< omega, per corner of each cell and per cell
-  std::optional<BoundaryFolds> folds_;                       ///< empty: they are not forbidden
-  std::vector<double> fold_emphasis_;                        ///< omega of each of its edges
-  double live_edge_ = 0;                                     ///< share of its wanted length that an edge must have
-  std::vector<Index> order_;                                 ///< cells by color
-  std::vector<std::size_t> color_offsets_;                   ///< first cell of each color in order_, and their number
+  std::vector<double> corner_emphasis_, cell_emphasis_;  ///< omega, per corner of each cell and per cell
+  std::optional<BoundaryFolds> folds_;                   ///< empty: they are not forbidden
+  std::vector<double> fold_emphasis_;                    ///< omega of each of its edges
+  double live_edge_ = 0;                                 ///< share of its wanted length that an edge must have
+  std::vector<Index> order_;                             ///< cells by color
+  std::vector<std::size_t> color_offsets_;               ///< first cell of each color in order_, and their number
   CellBlocks blocks_;
   BlockSparse hessian_;
 };

@@ -136,8 +136,8 @@ void regularized_barrier(RegularizedBatch& batch, double epsilon) {
     const double by_determinant = -(2.0 / 3) * shape * relative + size_slope - size * relative;
     batch.alpha[l] = 2 * kShapeWeight * power[l];
     batch.beta[l] = -(2.0 / 3) * batch.alpha[l] * relative;
-    batch.gamma[l] = (10.0 / 9) * shape * relative * relative + 2 * kSizeWeight * inverse -
-                     2 * size_slope * relative + 2 * size * relative * relative;
+    batch.gamma[l] = (10.0 / 9) * shape * relative * relative + 2 * kSizeWeight * inverse - 2 * size_slope * relative +
+                     2 * size * relative * relative;
     for (int k = 0; k < 9; ++k) batch.stress[k][l] = batch.alpha[l] * j[k][l] + by_determinant * batch.cofactor[k][l];
   }
 }

@@ -45,12 +45,11 @@ struct Symmetric {
 /// cos(acos(r) / 3) for r in [0, 1], the largest root c of 4 c^3 - 3 c = r. A polynomial that interpolates it at
 /// Chebyshev nodes is accurate to 1.3e-8; one Newton step then makes it accurate to rounding.
 [[gnu::always_inline]] inline Wide cosine_of_third(const Wide& r) {
-  const Wide c =
-      0.866025416 +
-      r * (0.166665043 +
-           r * (-0.0480773503 +
-                r * (0.0243923838 +
-                     r * (-0.0142895648 + r * (0.00766430175 + r * (-0.0029228305 + r * 0.000542607712))))));
+  const Wide c = 0.866025416 +
+                 r * (0.166665043 +
+                      r * (-0.0480773503 +
+                           r * (0.0243923838 +
+                                r * (-0.0142895648 + r * (0.00766430175 + r * (-0.0029228305 + r * 0.000542607712))))));
   const Wide c2 = c * c;
   return c - (c * (4 * c2 - 3) - r) * reciprocal(12 * c2 - 3);
 }
@@ -107,9 +106,7 @@ struct Symmetric {
   v[2] = -n[1];
 }
 
-[[gnu::always_inline]] inline Wide dot(const Wide* a, const Wide* b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+[[gnu::always_inline]] inline Wide dot(const Wide* a, const Wide* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// Returns J^T J divided by its trace; `inverse_trace` receives 1 / trace.
 [[gnu::always_inline]] inline Symmetric right_gram(const Wide* j, Wide& inverse_trace) {

@@ -174,8 +174,7 @@ double VolumeEnergy::value_of(std::span<const Vec3> nodes) const {
 }
 
 template <class Kernel>
-double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
-                                 std::span<Vec3> gradient) const {
+double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
   // Feasibility is known only at the end: the gradient is gathered in a copy, so that an infeasible state adds nothing.
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
@@ -220,7 +219,7 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kSimdLanes, 0.0);
     double sum = 0;
     for_points(group, b, state, kernel, &Kernel::evaluate_hessian, [&](std::size_t q, auto& batch) {
-      const double (*reference)[kSimdLanes] = reference_ ? group.reference(b, q) : nullptr;
+      const double(*reference)[kSimdLanes] = reference_ ? group.reference(b, q) : nullptr;
       if (reference) multiply_lanes_transposed(batch.stress, reference);
       for (int l = 0; l < kSimdLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
@@ -238,7 +237,7 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
       for (int a = 0; a < n; ++a) {
         gradient[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
         for (int c = a; c < n; ++c) {
-          const double (*block)[kSimdLanes] = k[a * n_max + c];
+          const double(*block)[kSimdLanes] = k[a * n_max + c];
           float* upper = hessian.block(slots[a * n + c]);
           for (int e = 0; e < 9; ++e) upper[e] += static_cast<float>(block[e][l]);
           if (c == a) continue;

@@ -77,7 +77,7 @@ class VolumeEnergy final : public RegularizedTerm {
     /// kSimdLanes lanes; empty: ideal cells.
     std::vector<double> to_reference;
     const double (*reference(std::size_t batch, std::size_t q) const)[kSimdLanes] {
-      return reinterpret_cast<const double (*)[kSimdLanes]>(to_reference.data() +
+      return reinterpret_cast<const double(*)[kSimdLanes]>(to_reference.data() +
                                                            9 * kSimdLanes * (batch * rule.num_points() + q));
     }
   };
@@ -92,8 +92,7 @@ class VolumeEnergy final : public RegularizedTerm {
   template <class Kernel>
   double gradient_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const;
   template <class Kernel>
-  double hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
-                    BlockSparse& hessian) const;
+  double hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
   void rebuild_groups();
   void fill_references(Group& group) const;
   void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kSimdLanes]) const;
@@ -106,8 +105,8 @@ class VolumeEnergy final : public RegularizedTerm {
   std::vector<double> weights_;
   const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
   double epsilon_ = 0, floor_ = kHessianFloor;
-  CellReference reference_;        ///< empty: ideal cells
-  std::vector<int> points_;        ///< points per direction of each cell
+  CellReference reference_;  ///< empty: ideal cells
+  std::vector<int> points_;  ///< points per direction of each cell
   std::vector<int> colors_;
   std::vector<Group> groups_;
   CellBlocks blocks_;

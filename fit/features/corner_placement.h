@@ -58,10 +58,10 @@ class CornerPlacement {
 
   const RoutingGraph& graph_;
   double h_;
-  std::map<Index, Index> clusters_;         ///< `corner_clusters`
+  std::map<Index, Index> clusters_;              ///< `corner_clusters`
   std::map<Index, std::vector<Index>> members_;  ///< of each cluster, by its number
-  std::map<Index, Index> representatives_;  ///< of the corners that share a vertex of another one
-  std::map<Index, Needs> needs_;            ///< by representative corner
+  std::map<Index, Index> representatives_;       ///< of the corners that share a vertex of another one
+  std::map<Index, Needs> needs_;                 ///< by representative corner
   std::map<Index, Index> vertex_of_corner_;
   std::vector<std::uint8_t> taken_;
 };

@@ -16,9 +16,9 @@ struct CreaseDistance {
   double target_length_percent = 0, followed_length_percent = 0;
   double mean_from_target_percent = 0, max_from_target_percent = 0;
   double mean_to_target_percent = 0, max_to_target_percent = 0;
-  Vec3 farthest{0, 0, 0};           ///< point of a curve or of a crease where the larger maximum is reached
-  double within_length_percent = 0; ///< length of all curves within kSharpPercent of any crease
-  double crease_length_percent = 0; ///< length of all segments, including those that follow nothing
+  Vec3 farthest{0, 0, 0};            ///< point of a curve or of a crease where the larger maximum is reached
+  double within_length_percent = 0;  ///< length of all curves within kSharpPercent of any crease
+  double crease_length_percent = 0;  ///< length of all segments, including those that follow nothing
 
   double mean_percent() const { return std::max(mean_from_target_percent, mean_to_target_percent); }
   double max_percent() const { return std::max(max_from_target_percent, max_to_target_percent); }

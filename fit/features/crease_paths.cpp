@@ -170,7 +170,8 @@ class PathFinder {
     const double edge = polyline_length(points) / static_cast<double>(path.size() - 1);
     if (!(edge > 0)) return std::nullopt;
     const double gap = std::max(farthest(sampled_polyline(points, edge / 8), polyline_tree(curve)),
-                                farthest(sampled_polyline(curve, edge / 8), polyline_tree(points))) / edge;
+                                farthest(sampled_polyline(curve, edge / 8), polyline_tree(points))) /
+                       edge;
     if (!(gap < kFollowShare)) return std::nullopt;
     return Found{std::move(path), gap};
   }

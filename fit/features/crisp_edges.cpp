@@ -83,7 +83,7 @@ class Bends {
   /// Marks the triangles of planes: connected triangles, two or more, whose normals are those of the largest one.
   void find_planes(std::span<const Vec3> normals) {
     constexpr double kMostPlaneNormalAngle = 0.5;  // degrees; normals of coordinates in single precision differ by less
-    constexpr double kLeastArea = 1e-4;  // share of the squared diagonal
+    constexpr double kLeastArea = 1e-4;            // share of the squared diagonal
     std::vector<Index> by_area(areas_.size());
     std::iota(by_area.begin(), by_area.end(), Index{0});
     std::ranges::stable_sort(by_area, std::greater(), [&](Index t) { return areas_[t]; });

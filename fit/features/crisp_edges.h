@@ -28,8 +28,8 @@ struct EdgeCrispness {
   /// longer crisp ones, and edges at planes. Figures of 184 surfaces:
   ///
   /// - Scans have a crisp share of less than 0.5, a relative length of less than 1, or at most 0.95 in the first sum.
-  ///   One has 1.01, because of the rim of a covered hole, and two coarse meshes of animals have more. They have at most
-  ///   1.24 in the second sum.
+  ///   One has 1.01, because of the rim of a covered hole, and two coarse meshes of animals have more. They have at
+  ///   most 1.24 in the second sum.
   /// - Parts have at least 0.51, 2.0 and 1.07, or 1.56 in the second sum.
   bool is_designed() const {
     // Relative length that counts as much as a crisp share of 1, and the factor on the planar share.

@@ -18,12 +18,12 @@ namespace subvol::internal {
 /// A grid prepared to follow the sharp edges of a target: routed, divided into patches and padded.
 struct EdgeLayout {
   FeatureRouting routing;
-  PatchedMesh patched;                ///< its mesh is the one to fit, from its positions; without tags
-  PadReport pads;                     ///< those of narrow strips are the last
+  PatchedMesh patched;  ///< its mesh is the one to fit, from its positions; without tags
+  PadReport pads;       ///< those of narrow strips are the last
   QualityCaps caps;
-  FollowedCreases creases;            ///< of the patched mesh
-  std::vector<CreaseSegment> segments;  ///< edges of the paths, and the curves of `creases` that they follow
-  std::vector<Index> group_of_face;   ///< of each face of the mesh, by `MeshTopology`; 0 for faces inside
+  FollowedCreases creases;               ///< of the patched mesh
+  std::vector<CreaseSegment> segments;   ///< edges of the paths, and the curves of `creases` that they follow
+  std::vector<Index> group_of_face;      ///< of each face of the mesh, by `MeshTopology`; 0 for faces inside
   std::vector<Index> group_of_triangle;  ///< of each triangle of the target
 
   /// The mesh with tags on the edges of the paths.

@@ -436,7 +436,7 @@ class Router {
   Occupied base_;  ///< the vertices of corners
   Paths best_;
   double best_length_ = 0;
-  std::vector<Index> alone_;  ///< curves that have a path if no other one has
+  std::vector<Index> alone_;                      ///< curves that have a path if no other one has
   std::map<Index, std::vector<PartPath>> parts_;  ///< of the curves that were tried in parts
 };
 

@@ -45,9 +45,9 @@ struct RoutingOptions {
 };
 
 struct FeatureRouting {
-  std::vector<CreasePath> paths;            ///< ascending by curve; a curve in parts has several, in its order
-  std::vector<PlacedCorner> corners;        ///< those at which a path ends, ascending by vertex
-  std::vector<Index> joined;                ///< curves whose path ends inside the path of another one; ascending
+  std::vector<CreasePath> paths;      ///< ascending by curve; a curve in parts has several, in its order
+  std::vector<PlacedCorner> corners;  ///< those at which a path ends, ascending by vertex
+  std::vector<Index> joined;          ///< curves whose path ends inside the path of another one; ascending
   /// Holds one entry for each path of a curve that is followed in part, in the order of the paths.
   std::vector<FollowedPart> parts;
   std::vector<UnfollowedCurve> unfollowed;  ///< those followed in part are among them; ascending by curve

@@ -252,8 +252,7 @@ std::string to_string(PadProblem problem) {
   switch (problem) {
     case PadProblem::touches_itself: return "the pad would touch itself";
     case PadProblem::too_many_paths: return "the pad would split a corner";
-    case PadProblem::moves_shared:
-      return "the pad would move faces of cells beyond";
+    case PadProblem::moves_shared: return "the pad would move faces of cells beyond";
     case PadProblem::inverted: return "the pad would invert a cell";
   }
   return "unknown";

@@ -43,9 +43,9 @@ std::optional<PadRefusal> topological_refusal(const PatchFans& fans, const Patch
 
 /// State of a set of patches at one vertex.
 struct FanState {
-  bool any = false;    ///< some face is padded
-  int changes = 0;     ///< number of edges between a padded and an unpadded face
-  int free_paths = 0;  ///< number of edges of paths between unpadded faces
+  bool any = false;     ///< some face is padded
+  int changes = 0;      ///< number of edges between a padded and an unpadded face
+  int free_paths = 0;   ///< number of edges of paths between unpadded faces
   bool shared = false;  ///< some unpadded face is shared
   std::optional<PadProblem> problem() const;
 };

@@ -18,8 +18,8 @@ namespace subvol::internal {
 
 /// Curves of a target with regions that a mesh is to follow.
 struct SheetCurves {
-  SignedFeatures features;                   ///< curves, and the parts of the sheets between them; angles say nothing
-  std::vector<std::uint8_t> are_junctions;   ///< by curve: 1 where sheets meet, 0 for sharp edges within a sheet
+  SignedFeatures features;                  ///< curves, and the parts of the sheets between them; angles say nothing
+  std::vector<std::uint8_t> are_junctions;  ///< by curve: 1 where sheets meet, 0 for sharp edges within a sheet
 };
 
 /// Finds the curves along which sheets meet and, with an angle, edges that are sharper.

@@ -33,8 +33,8 @@ std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const Cl
                           const FlatFacets& facets);
 
 /// Does the same for the vertices of a cage, whose subdivision surface becomes flat where they are. The cells of its
-/// mesh are judged, and moves are compared with twice the edges of the mesh, because cells of a cage are often flat, and
-/// its edges short, if the mesh is good. If a cell suffers, vertices of the cage that move it stay.
+/// mesh are judged, and moves are compared with twice the edges of the mesh, because cells of a cage are often flat,
+/// and its edges short, if the mesh is good. If a cell suffers, vertices of the cage that move it stay.
 std::size_t flatten_faces(FittedCage& cage, const TriangleMesh& target, const ClosestPoint& tree,
                           const FlatFacets& facets);
 

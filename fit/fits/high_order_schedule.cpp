@@ -41,9 +41,8 @@ HighOrderSchedule make_high_order_schedule(double lambda_close, double distance)
   schedule.far = shares.front() < 1;
   schedule.tries = {{Approach::direct, shares[0]}};
   if (schedule.far)
-    schedule.tries.insert(schedule.tries.end(), {{Approach::direct, shares[2]},
-                                                    {Approach::stiff, shares[0]},
-                                                    {Approach::stiff, shares[1]}});
+    schedule.tries.insert(schedule.tries.end(),
+                          {{Approach::direct, shares[2]}, {Approach::stiff, shares[0]}, {Approach::stiff, shares[1]}});
   schedule.lambda_close = lambda_close;
   return schedule;
 }

@@ -97,8 +97,8 @@ EntityOrders raised_where_it_pays(const ElementSpace& space, const EntityOrders&
   };
   std::vector<Candidate> candidates;
   for_each_entity(space, [&](int kind, std::size_t entity, EntityShape shape) {
-    const int more = num_modes(shape, entities(next, kind)[entity]) -
-                     num_modes(shape, entities(space.orders(), kind)[entity]);
+    const int more =
+        num_modes(shape, entities(next, kind)[entity]) - num_modes(shape, entities(space.orders(), kind)[entity]);
     const double gain = entities(gains, kind)[entity];
     if (more == 0 || !(gain > 0)) return;
     candidates.push_back({gain / more, gain, kind, entity});

@@ -20,16 +20,16 @@ std::vector<Index> number_edges(const PolygonMesh& polygons, std::size_t& num_ed
     const std::size_t begin = polygons.face_offsets[f], end = polygons.face_offsets[f + 1];
     for (std::size_t corner = begin; corner < end; ++corner) {
       const Index v = polygons.face_vertices[corner], w = polygons.face_vertices[corner + 1 < end ? corner + 1 : begin];
-      uses.push_back({static_cast<std::uint64_t>(std::min(v, w)) << 32 | static_cast<std::uint32_t>(std::max(v, w)),
-                      corner});
+      uses.push_back(
+          {static_cast<std::uint64_t>(std::min(v, w)) << 32 | static_cast<std::uint32_t>(std::max(v, w)), corner});
     }
   }
   std::sort(uses.begin(), uses.end(),
             [](const Use& a, const Use& b) { return a.key != b.key ? a.key < b.key : a.corner < b.corner; });
   std::vector<std::size_t> first_corner(uses.size());
   for (std::size_t i = 0; i < uses.size(); ++i)
-    first_corner[uses[i].corner] = i > 0 && uses[i].key == uses[i - 1].key ? first_corner[uses[i - 1].corner]
-                                                                           : uses[i].corner;
+    first_corner[uses[i].corner] =
+        i > 0 && uses[i].key == uses[i - 1].key ? first_corner[uses[i - 1].corner] : uses[i].corner;
   std::vector<Index> edge(uses.size());
   num_edges = 0;
   for (std::size_t corner = 0; corner < edge.size(); ++corner)

@@ -18,9 +18,9 @@ namespace subvol {
 class ClosestPoint {
  public:
   struct Hit {
-    Vec3 point;                  ///< the closest point
-    Index triangle = kNoIndex;   ///< a triangle that contains it
-    double distance = 0;         ///< >= 0
+    Vec3 point;                 ///< the closest point
+    Index triangle = kNoIndex;  ///< a triangle that contains it
+    double distance = 0;        ///< >= 0
   };
 
   /// InputError: no triangles, a vertex number out of range, or a position that is not finite. Runs in parallel; the
@@ -58,7 +58,7 @@ class ClosestPoint {
   /// Boxes of the children, coordinate by coordinate, so that all of them are tested at once.
   struct Node {
     std::array<std::array<double, kTreeWidth>, 3> low, high;
-    std::array<Index, kTreeWidth> child;    ///< number of a node or leaf; kNoIndex: no child
+    std::array<Index, kTreeWidth> child;  ///< number of a node or leaf; kNoIndex: no child
     std::array<bool, kTreeWidth> is_leaf;
   };
   /// Triangles, coordinate by coordinate for the same reason; unused lanes repeat the first triangle.

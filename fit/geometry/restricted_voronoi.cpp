@@ -130,8 +130,7 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
     std::optional<TriangleCutter> cutter;
     errors.guard([&] { cutter.emplace(tree_); });
 #pragma omp for schedule(dynamic)
-    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk)
-      errors.guard([&] { cut(chunk, thread, *cutter, mine); });
+    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) errors.guard([&] { cut(chunk, thread, *cutter, mine); });
 #pragma omp single
     if (omp_get_num_threads() > 1) errors.guard(make_room);
     if (omp_get_num_threads() > 1)

@@ -38,8 +38,7 @@ TriangleMesh from_cgal(const Mesh& mesh) {
   }
   for (const auto f : mesh.faces()) {
     const auto h = mesh.halfedge(f);
-    surface.triangles.push_back(
-        {number[mesh.source(h)], number[mesh.target(h)], number[mesh.target(mesh.next(h))]});
+    surface.triangles.push_back({number[mesh.source(h)], number[mesh.target(h)], number[mesh.target(mesh.next(h))]});
   }
   return surface;
 }
@@ -61,8 +60,7 @@ std::optional<TriangleMesh> combined(const TriangleMesh& a, const TriangleMesh& 
 
 std::optional<TriangleMesh> united(const TriangleMesh& a, const TriangleMesh& b) {
   return combined(a, b, [](Mesh& first, Mesh& second, Mesh& result) {
-    return pmp::corefine_and_compute_union(first, second, result,
-                                           CGAL::parameters::throw_on_self_intersection(true));
+    return pmp::corefine_and_compute_union(first, second, result, CGAL::parameters::throw_on_self_intersection(true));
   });
 }
 

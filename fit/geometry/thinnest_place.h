@@ -12,9 +12,9 @@ namespace subvol::internal {
 
 /// A place where two stretches of a surface face each other.
 struct ThinPlace {
-  double width = 0;                                   ///< distance between the two, > 0, in the surface's unit
-  Vec3 at, across;                                    ///< a point of either
-  std::array<Index, 2> triangles{kNoIndex, kNoIndex}; ///< that contain these points
+  double width = 0;                                    ///< distance between the two, > 0, in the surface's unit
+  Vec3 at, across;                                     ///< a point of either
+  std::array<Index, 2> triangles{kNoIndex, kNoIndex};  ///< that contain these points
 };
 
 /// Which side of a surface is looked at.

@@ -70,14 +70,14 @@ class LocalMender {
   MendingGoal goal_;
   const std::function<bool()>& cancelled_;
   std::vector<Vec3> given_;
-  std::vector<std::vector<Index>> around_;  ///< triangles at each vertex
-  std::vector<Index> along_x_;              ///< triangles, by where they were at first
-  std::vector<std::size_t> run_of_;         ///< of each triangle
+  std::vector<std::vector<Index>> around_;      ///< triangles at each vertex
+  std::vector<Index> along_x_;                  ///< triangles, by where they were at first
+  std::vector<std::size_t> run_of_;             ///< of each triangle
   std::vector<Eigen::AlignedBox3d> run_boxes_;  ///< around each run of triangles, and where they were before
-  std::vector<char> is_touched_;            ///< triangles that were changed in this round
-  std::size_t work_ = 0;                    ///< done so far, in pairs of triangles tested
-  int num_pair_searches_ = 0;               ///< faults for which two changes at a time were tried
-  std::vector<Eigen::AlignedBox3d> changed_;  ///< boxes of the triangles that changed, before and after, in order
+  std::vector<char> is_touched_;                ///< triangles that were changed in this round
+  std::size_t work_ = 0;                        ///< done so far, in pairs of triangles tested
+  int num_pair_searches_ = 0;                   ///< faults for which two changes at a time were tried
+  std::vector<Eigen::AlignedBox3d> changed_;    ///< boxes of the triangles that changed, before and after, in order
   /// A fault that no change mended.
   struct Failure {
     Eigen::AlignedBox3d box;  ///< of the triangles that were looked at
@@ -124,8 +124,8 @@ MendingPatch LocalMender::patch_around(const std::vector<Index>& seeds, std::vec
     for (const Index v : of) found.insert(around_[v].begin(), around_[v].end());
     return found;
   };
-  const std::set<Index> core(seeds.begin(), seeds.end()), first = corners_of(core),
-                        second = corners_of(triangles_at(first)), ring = triangles_at(second);
+  const std::set<Index> core(seeds.begin(), seeds.end()),
+      first = corners_of(core), second = corners_of(triangles_at(first)), ring = triangles_at(second);
   std::set<Index> chosen = ring;
   std::vector<Eigen::AlignedBox3d> boxes;
   MendingPatch patch;
@@ -260,8 +260,7 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
   try_all(given_faults, {});
   if (is_cancelled()) return false;
   if (!trials.empty() && best()->rating.faults >= before.faults && num_pair_searches_++ < kMostPairSearches) {
-    std::stable_sort(trials.begin(), trials.end(),
-                     [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
+    std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
     const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
     for (const Trial& trial : first) {
       PatchUndo replaced;

@@ -22,7 +22,7 @@ void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, doubl
 
 /// The changes that `mend_locally` has made.
 struct LocalMending {
-  std::vector<char> is_dropped;    ///< per triangle of the mesh
+  std::vector<char> is_dropped;  ///< per triangle of the mesh
   std::size_t flipped_edges = 0, moved_vertices = 0;
   bool is_cancelled = false;
 };

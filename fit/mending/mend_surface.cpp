@@ -286,7 +286,8 @@ std::string to_text(const MendedSurface& mended, double diagonal) {
   tell(mended.moved_vertices, "vertex moved", "vertices moved");
   if (text.empty()) return text;
   return formatted("mended within %.3g (%.2g %% of the diagonal): ", mended.distance,
-                   diagonal > 0 ? 100 * mended.distance / diagonal : 0) + text;
+                   diagonal > 0 ? 100 * mended.distance / diagonal : 0) +
+         text;
 }
 
 }  // namespace subvol

@@ -27,8 +27,8 @@ struct MendedSurface {
   std::size_t dropped_faces = 0;      ///< faces that collapsed, or that were there twice
   std::size_t flipped_edges = 0;      ///< pairs of triangles whose common edge was exchanged for the other diagonal
   std::size_t moved_vertices = 0;
-  double distance = 0;                ///< largest distance between the two surfaces, in their unit
-  bool is_cancelled = false;          ///< then the surface is as it was given
+  double distance = 0;        ///< largest distance between the two surfaces, in their unit
+  bool is_cancelled = false;  ///< then the surface is as it was given
 
   bool is_mended() const {
     return merged_vertices + split_vertices + dropped_faces + flipped_edges + moved_vertices > 0;

@@ -36,10 +36,10 @@ struct PatchUndo {
 
 /// The triangles around a fault and all that are near them, with numbers of their own.
 struct MendingPatch {
-  TriangleMesh mesh;            ///< dropped triangles are `kDropped`
-  std::vector<char> is_inner;   ///< vertices all of whose triangles are in the patch
-  std::vector<char> is_border;  ///< vertices at an edge of one triangle, of the inner ones
-  Eigen::AlignedBox3d box;      ///< in which triangles are of the patch
+  TriangleMesh mesh;                       ///< dropped triangles are `kDropped`
+  std::vector<char> is_inner;              ///< vertices all of whose triangles are in the patch
+  std::vector<char> is_border;             ///< vertices at an edge of one triangle, of the inner ones
+  Eigen::AlignedBox3d box;                 ///< in which triangles are of the patch
   std::vector<std::vector<Index>> around;  ///< triangles at each vertex, ascending; see `index`
   std::vector<Eigen::AlignedBox3d> boxes;  ///< of each triangle
 

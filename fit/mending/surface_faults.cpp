@@ -85,9 +85,9 @@ std::string to_text(const SurfaceFaults& faults, const PolygonMesh& surface, con
                   std::to_string(name_of(g, names.faces)) + " at " + to_text(meeting_place(surface, {f, g}));
          }));
   if (!faults.hidden.empty())
-    tell("no direction sees all faces around from their front at " +
-             counted(faults.hidden.size(), "vertex", "vertices"),
-         text_of_vertices(faults.hidden, surface.positions, names.vertices));
+    tell(
+        "no direction sees all faces around from their front at " + counted(faults.hidden.size(), "vertex", "vertices"),
+        text_of_vertices(faults.hidden, surface.positions, names.vertices));
   return text;
 }
 

@@ -18,10 +18,10 @@ inline constexpr std::size_t kMostNamedPlaces = 10;
 
 /// Faults that keep layers from standing on a surface that `make_layers` accepts, or the surface from bounding a solid.
 struct SurfaceFaults {
-  std::vector<Index> flat;                      ///< faces with a triangle without area, ascending
-  std::vector<std::array<Index, 2>> meeting;    ///< pairs of faces that intersect or touch, smaller first, ascending
-  std::vector<Index> hidden;                    ///< vertices from which no direction sees all faces around, ascending
-  bool is_complete = true;                      ///< false: canceled, or ended as in `self_intersections`
+  std::vector<Index> flat;                    ///< faces with a triangle without area, ascending
+  std::vector<std::array<Index, 2>> meeting;  ///< pairs of faces that intersect or touch, smaller first, ascending
+  std::vector<Index> hidden;                  ///< vertices from which no direction sees all faces around, ascending
+  bool is_complete = true;                    ///< false: canceled, or ended as in `self_intersections`
   bool none() const { return flat.empty() && meeting.empty() && hidden.empty() && is_complete; }
 };
 

@@ -18,9 +18,9 @@ namespace subvol {
 struct SurfaceRepair {
   TriangleMesh surface;
   std::optional<RegionSurface> regions;  ///< of the surface, if there are several
-  std::vector<std::string> done;   ///< a sentence for each repair; empty: the surface is as it was given
-  std::vector<std::string> notes;  ///< a sentence for each fault that was left: contacts, pinholes, crossings
-  bool is_fillable = false;        ///< no fault that `prevents_filling` is left but pinholes, which filling closes
+  std::vector<std::string> done;         ///< a sentence for each repair; empty: the surface is as it was given
+  std::vector<std::string> notes;        ///< a sentence for each fault that was left: contacts, pinholes, crossings
+  bool is_fillable = false;  ///< no fault that `prevents_filling` is left but pinholes, which filling closes
 };
 
 /// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting,

@@ -108,7 +108,7 @@ class OpenVertices {
   std::span<const Vec3> positions_;
   double tolerance_;
   int axis_ = 0;
-  std::vector<Index> vertices_;  ///< ascending along the axis
+  std::vector<Index> vertices_;                           ///< ascending along the axis
   static constexpr std::size_t kMostTests = 300'000'000;  ///< a second; a surface that needs more is a soup
   std::size_t num_tests_ = 0;
 };

@@ -14,8 +14,8 @@ namespace {
 /// A corner and its three neighbors, in the order of a right-handed system.
 using Corner = std::array<int, 4>;
 
-constexpr std::array<Corner, 8> kHexCorners{{{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
-                                             {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}}};
+constexpr std::array<Corner, 8> kHexCorners{
+    {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7}, {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}}};
 constexpr std::array<Corner, 6> kPrismCorners{
     {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5}, {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}}};
 constexpr std::array<Corner, 4> kTetCorners{{{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 0, 1, 3}, {3, 1, 0, 2}}};
@@ -25,8 +25,7 @@ constexpr std::array<Corner, 4> kPyramidCorners{{{0, 1, 3, 4}, {1, 2, 0, 4}, {2,
 std::span<const Corner> corners_of(CellKind kind) {
   switch (kind) {
     case CellKind::hex: return kHexCorners;
-    case CellKind::pyramid:
-      return kPyramidCorners;
+    case CellKind::pyramid: return kPyramidCorners;
     case CellKind::prism: return kPrismCorners;
     default: return kTetCorners;
   }

@@ -9,9 +9,9 @@ namespace subvol {
 
 /// Scaled Jacobians at the corners of cells, as Verdict and the programs that use it compute them.
 struct CornerQuality {
-  double min_scaled_jacobian = 1;     ///< of all corners; 1 without cells
-  double mean_scaled_jacobian = 1;    ///< mean of `cell_minima`; 1 without cells
-  std::vector<double> cell_minima;    ///< the least of each cell's corners
+  double min_scaled_jacobian = 1;   ///< of all corners; 1 without cells
+  double mean_scaled_jacobian = 1;  ///< mean of `cell_minima`; 1 without cells
+  std::vector<double> cell_minima;  ///< the least of each cell's corners
 };
 
 /// Measures the scaled Jacobian at every corner of a mesh's cells:

@@ -169,14 +169,10 @@ Sampled<double> sample_pyramid(std::span<const Vec3> corners, int n, std::span<c
 
 std::size_t num_samples(CellKind kind, std::size_t n) {
   switch (kind) {
-    case CellKind::tet:
-      return n * (n + 1) * (n + 2) / 6;
-    case CellKind::prism:
-      return n * n * (n + 1) / 2;
-    case CellKind::pyramid:
-      return n * n;
-    case CellKind::hex:
-      break;
+    case CellKind::tet: return n * (n + 1) * (n + 2) / 6;
+    case CellKind::prism: return n * n * (n + 1) / 2;
+    case CellKind::pyramid: return n * n;
+    case CellKind::hex: break;
   }
   return n * n * n;
 }
@@ -295,8 +291,7 @@ void QualityReport::keep_worst(const std::function<Vec3(Index)>& center) {
 
 QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction, const CellReference& reference) {
   const int n = samples_per_direction;
-  if (n < 2)
-    throw InputError("quality: samples_per_direction is " + std::to_string(n) + ", expected 2 or more");
+  if (n < 2) throw InputError("quality: samples_per_direction is " + std::to_string(n) + ", expected 2 or more");
   QualityReport report;
   report.num_cells = mesh.num_cells();
   const std::vector<Sampled<double>> samples = sample_cells(mesh, n, reference);

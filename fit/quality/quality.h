@@ -22,14 +22,14 @@ struct QualityReport {
     double value;  ///< its lowest scaled Jacobian
   };
   std::size_t num_cells = 0, num_samples = 0;
-  double min_scaled_jacobian = 1;   ///< over all samples of all cells; 1 without cells
+  double min_scaled_jacobian = 1;  ///< over all samples of all cells; 1 without cells
   /// Mean over each cell with the trapezoidal rule's weights (so that faces, on which many samples lie, do not count
   /// too much), then mean over all cells, where a cell counts as often as it has samples. 1 without cells.
   double mean_scaled_jacobian = 1;
-  std::vector<double> cell_minima;                            ///< lowest scaled Jacobian of each cell
-  std::array<std::size_t, kNumHistogramBins> histogram{};     ///< of cell_minima; equal bins over [-1, 1]
-  std::size_t inverted_cells = 0;                             ///< with a sample <= 0, or refuted by the certificate
-  std::vector<WorstCell> worst_cells;                         ///< the ten lowest, ascending by value, then by number
+  std::vector<double> cell_minima;                         ///< lowest scaled Jacobian of each cell
+  std::array<std::size_t, kNumHistogramBins> histogram{};  ///< of cell_minima; equal bins over [-1, 1]
+  std::size_t inverted_cells = 0;                          ///< with a sample <= 0, or refuted by the certificate
+  std::vector<WorstCell> worst_cells;                      ///< the ten lowest, ascending by value, then by number
   CertificateSummary certificate;
 
   /// Adds one cell to cell_minima, min_scaled_jacobian, histogram and inverted_cells.

@@ -42,9 +42,8 @@ double sum_over_fan(const VolumeMesh& mesh, std::span<const Index> face, const O
 }
 
 double face_area(const VolumeMesh& mesh, std::span<const Index> face) {
-  return sum_over_fan(mesh, face, [](const Vec3& a, const Vec3& b, const Vec3& c) {
-    return 0.5 * (b - a).cross(c - a).norm();
-  });
+  return sum_over_fan(mesh, face,
+                      [](const Vec3& a, const Vec3& b, const Vec3& c) { return 0.5 * (b - a).cross(c - a).norm(); });
 }
 
 /// A bilinear patch encloses the volume of the fan around its center.

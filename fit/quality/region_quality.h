@@ -20,7 +20,7 @@ struct RegionQuality {
   std::string name;  ///< of its group in `VolumeMesh::regions`; may be empty
   std::size_t num_cells = 0, num_uncertified = 0;
   double volume = 0;
-  double area = 0;   ///< of its faces on the boundary
+  double area = 0;  ///< of its faces on the boundary
   double min_scaled_jacobian = 1;
 };
 

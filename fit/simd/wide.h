@@ -92,10 +92,14 @@ using AlignedFloats = std::vector<float, AlignedAllocator<float>>;
 template <class Vector>
 void take_lower(Vector& a, const Vector& b) {
 #if defined __AVX512F__ && defined __AVX512VL__
-  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_min_pd((__m512d)b, (__m512d)a);
-  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_min_ps((__m256)b, (__m256)a);
-  else if constexpr (std::is_same_v<Vector, WideFloats>) a = (Vector)_mm512_min_ps((__m512)b, (__m512)a);
-  else a = b < a ? b : a;
+  if constexpr (std::is_same_v<Vector, Wide>)
+    a = (Vector)_mm512_min_pd((__m512d)b, (__m512d)a);
+  else if constexpr (std::is_same_v<Vector, Narrow>)
+    a = (Vector)_mm256_min_ps((__m256)b, (__m256)a);
+  else if constexpr (std::is_same_v<Vector, WideFloats>)
+    a = (Vector)_mm512_min_ps((__m512)b, (__m512)a);
+  else
+    a = b < a ? b : a;
 #else
   a = b < a ? b : a;
 #endif
@@ -103,10 +107,14 @@ void take_lower(Vector& a, const Vector& b) {
 template <class Vector>
 void take_higher(Vector& a, const Vector& b) {
 #if defined __AVX512F__ && defined __AVX512VL__
-  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_max_pd((__m512d)b, (__m512d)a);
-  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_max_ps((__m256)b, (__m256)a);
-  else if constexpr (std::is_same_v<Vector, WideFloats>) a = (Vector)_mm512_max_ps((__m512)b, (__m512)a);
-  else a = b > a ? b : a;
+  if constexpr (std::is_same_v<Vector, Wide>)
+    a = (Vector)_mm512_max_pd((__m512d)b, (__m512d)a);
+  else if constexpr (std::is_same_v<Vector, Narrow>)
+    a = (Vector)_mm256_max_ps((__m256)b, (__m256)a);
+  else if constexpr (std::is_same_v<Vector, WideFloats>)
+    a = (Vector)_mm512_max_ps((__m512)b, (__m512)a);
+  else
+    a = b > a ? b : a;
 #else
   a = b > a ? b : a;
 #endif
@@ -117,9 +125,12 @@ template <class Vector>
 void take_higher_size(Vector& a, const Vector& x) {
 #if defined __AVX512DQ__ && defined __AVX512VL__
   constexpr int kWithoutSign = 0b1011;  // the higher of both absolute values
-  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_range_pd((__m512d)a, (__m512d)x, kWithoutSign);
-  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_range_ps((__m256)a, (__m256)x, kWithoutSign);
-  else a = (Vector)_mm512_range_ps((__m512)a, (__m512)x, kWithoutSign);
+  if constexpr (std::is_same_v<Vector, Wide>)
+    a = (Vector)_mm512_range_pd((__m512d)a, (__m512d)x, kWithoutSign);
+  else if constexpr (std::is_same_v<Vector, Narrow>)
+    a = (Vector)_mm256_range_ps((__m256)a, (__m256)x, kWithoutSign);
+  else
+    a = (Vector)_mm512_range_ps((__m512)a, (__m512)x, kWithoutSign);
 #else
   const Vector size = x < 0 ? -x : x;
   a = size > a ? size : a;
@@ -182,10 +193,12 @@ inline double sum_of_lanes(const Wide& v) {
 template <class Vector>
 unsigned lanes_within(const Vector& v, std::remove_cvref_t<decltype(v[0])> limit) {
 #if defined __AVX512F__ && defined __AVX512VL__
-  if constexpr (std::is_same_v<Vector, Wide>) return _mm512_cmp_pd_mask((__m512d)v, _mm512_set1_pd(limit), _CMP_LE_OQ);
+  if constexpr (std::is_same_v<Vector, Wide>)
+    return _mm512_cmp_pd_mask((__m512d)v, _mm512_set1_pd(limit), _CMP_LE_OQ);
   else if constexpr (std::is_same_v<Vector, Narrow>)
     return _mm256_cmp_ps_mask((__m256)v, _mm256_set1_ps(limit), _CMP_LE_OQ);
-  else return _mm512_cmp_ps_mask((__m512)v, _mm512_set1_ps(limit), _CMP_LE_OQ);
+  else
+    return _mm512_cmp_ps_mask((__m512)v, _mm512_set1_ps(limit), _CMP_LE_OQ);
 #else
   unsigned lanes = 0;
   for (int k = 0; k < static_cast<int>(sizeof v / sizeof v[0]); ++k) lanes |= static_cast<unsigned>(v[k] <= limit) << k;

@@ -42,8 +42,8 @@ struct FitProblem {
   /// all move freely. Newton's method alone keeps to them.
   std::vector<Mat3> projectors;
   std::unique_ptr<VolumeTerm> volume;
-  std::unique_ptr<SurfaceTerm> surface;   ///< null: no surface term; N then has no rows
-  double lambda;                          ///< > 0
+  std::unique_ptr<SurfaceTerm> surface;  ///< null: no surface term; N then has no rows
+  double lambda;                         ///< > 0
 };
 
 }  // namespace subvol::internal

@@ -26,8 +26,12 @@ struct Value {
 class Objective {
  public:
   explicit Objective(FitProblem& problem)
-      : problem_(problem), nodes_(problem.nodes.num_rows()), samples_(problem.samples.num_rows()),
-        node_gradient_(nodes_.size()), sample_gradient_(samples_.size()), from_samples_(problem.nodes.num_cols) {}
+      : problem_(problem),
+        nodes_(problem.nodes.num_rows()),
+        samples_(problem.samples.num_rows()),
+        node_gradient_(nodes_.size()),
+        sample_gradient_(samples_.size()),
+        from_samples_(problem.nodes.num_cols) {}
 
   Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
     problem_.apply_nodes(x, nodes_);

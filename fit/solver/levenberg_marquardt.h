@@ -31,7 +31,8 @@ namespace subvol::internal {
 /// x  start, receives the result. E must be finite there, else `infeasible_start`. With `begun`, x as passed to `keep`.
 /// Converged if two steps in a row decrease E by less than `relative_decrease`; no_step: none of eight values of mu
 /// gives a step that decreases E. Same bits for any number of threads.
-MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x,
+                                             const MinimizerOptions& options);
 
 /// Returns mu after these steps of a minimization that began with mu = `first`.
 double damping_after(double first, std::span<const IterationRecord> steps);

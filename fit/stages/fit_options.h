@@ -28,12 +28,12 @@ enum class SolverKind { newton, lbfgs };
 
 /// Options of `fit_subdivision_volume`.
 struct FitOptions {
-  int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
+  int levels = 3;  ///< subdivision level of the finest mesh, 1..6
   /// The fit ends once the mean distance is at most this, in percent of the target's diagonal; > 0.
   std::optional<double> tolerance_percent;
   FittedSurface surface = FittedSurface::limit;
   BoundaryRule boundary = BoundaryRule::catmull_clark;
-  bool cage_only = false;                        ///< the degrees of freedom stay the vertices of the given template
+  bool cage_only = false;  ///< the degrees of freedom stay the vertices of the given template
   /// Weights of E_W, > 0. lambda_far: cap on lambda while a level is started. lambda_close: lambda of the last stage on
   /// the finest level; if the fit is not accurate enough, lambda is lowered below it: to a sixteenth of it at
   /// least, or to a thousandth if there is a tolerance.
@@ -47,7 +47,7 @@ struct FitOptions {
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points
-  Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
+  Distortion distortion = Distortion::hencky;        ///< the distortion e in E_W
   /// Least scaled Jacobian to aim at on the finest level, in [0, 0.8], as far as the distances allow; 0: none.
   double quality = kUsualQuality;
   /// If the cage does not let the cells reach the quality, the finest mesh is freed from it: all vertices of that mesh
@@ -58,8 +58,8 @@ struct FitOptions {
   /// keep_states.
   bool frees_mesh = false;
   SolveControl control{};
-  double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
-  bool keep_states = false;                      ///< fills FitResult::states
+  double memory_limit_bytes = 0;  ///< for the whole process, see `MemoryBudget`; 0: no limit
+  bool keep_states = false;       ///< fills FitResult::states
 };
 
 }  // namespace subvol

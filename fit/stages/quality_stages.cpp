@@ -110,8 +110,8 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
   double squares = 0;
   for (const Index f : topology.boundary_faces()) squares += square(f);
   for (const Index f : boundary.interfaces) squares += square(f);
-  const double count = static_cast<double>(
-      std::max<std::size_t>(topology.boundary_faces().size() + boundary.interfaces.size(), 1));
+  const double count =
+      static_cast<double>(std::max<std::size_t>(topology.boundary_faces().size() + boundary.interfaces.size(), 1));
   const double mean_square = squares / count;
   mean_length_ = std::sqrt(mean_square);
   lambda_one_ = mean_square / (2 * count * target.length() * target.length());

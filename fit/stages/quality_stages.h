@@ -23,9 +23,9 @@ namespace subvol::internal {
 
 /// One minimization of E_S + lambda E_Q, E_Q being `QualityEnergy`.
 struct QualityStage {
-  double surface;    ///< w_s: weight of the surface against the cells, > 0
+  double surface;  ///< w_s: weight of the surface against the cells, > 0
   QualityWeights weights;
-  int steps;         ///< at most so many
+  int steps;  ///< at most so many
 };
 
 /// Judges the states of a lift; the one with the highest merit is kept:
@@ -51,7 +51,7 @@ struct QualitySchedule {
   std::vector<QualityStage> stages;
   /// The lift: this stage is repeated, two steps at a time, with rising emphasis on what is still poor.
   QualityStage lift;
-  double goal;       ///< least scaled Jacobian at which the lift ends
+  double goal;  ///< least scaled Jacobian at which the lift ends
   /// Largest distance to aim at in the lift, as a share of the diagonal; 0: none. Where the surfaces are farther apart
   /// than most of it, they draw each other more and more, as poor cells are emphasized more and more.
   double most_distance = 0;
@@ -94,11 +94,11 @@ inline constexpr double kQualityTangentialWeight = 0.02;
 
 /// The boundary of a mesh as it is compared with the target: sample triangles on its faces.
 struct QualityBoundary {
-  SparseMap samples;  ///< degrees of freedom -> samples; no rows: the surface does not matter
-  std::vector<Vec3> fixed;                        ///< what is added to the samples if vertices are fixed; else empty
-  std::vector<std::array<Index, 3>> triangles;    ///< of samples
-  std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
-  std::vector<Index> interfaces;                  ///< faces between regions that have sample triangles, too
+  SparseMap samples;                            ///< degrees of freedom -> samples; no rows: the surface does not matter
+  std::vector<Vec3> fixed;                      ///< what is added to the samples if vertices are fixed; else empty
+  std::vector<std::array<Index, 3>> triangles;  ///< of samples
+  std::vector<Index> triangle_faces;            ///< face of the mesh of each triangle, by `MeshTopology`
+  std::vector<Index> interfaces;                ///< faces between regions that have sample triangles, too
   /// Groups of each face of the mesh and of each of the target's triangles (`ClosestPointEnergy::set_groups`); empty:
   /// none.
   std::vector<Index> group_of_face, group_of_triangle;
@@ -113,8 +113,8 @@ class QualityStages {
   ///          for the others; empty: none is fixed.
   /// target   must outlive this; sampled about four times for each boundary face.
   /// creases  energy(width) of the creases that follow edges of the target, over the samples; empty: there are none.
-  QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes,
-                std::vector<Vec3> fixed, const QualityBoundary& boundary, const TargetSurface& target,
+  QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes, std::vector<Vec3> fixed,
+                const QualityBoundary& boundary, const TargetSurface& target,
                 const std::function<CreaseEnergy(double width)>& creases = {});
 
   /// A state that the lift reached.
@@ -167,9 +167,9 @@ class QualityStages {
   std::unique_ptr<VolumeMesh> patch_mesh_;  ///< of a patch; null: a whole level
   const VolumeMesh* mesh_;
   double damping_ = kFirstDamping;  ///< for the next stage
-  double mean_length_ = 0;  ///< wanted, of the cells at the boundary
-  double lambda_one_ = 1;   ///< lambda for w_s = 1
-  double step_work_ = 1;    ///< of a step, as a share of one of the whole level
+  double mean_length_ = 0;          ///< wanted, of the cells at the boundary
+  double lambda_one_ = 1;           ///< lambda for w_s = 1
+  double step_work_ = 1;            ///< of a step, as a share of one of the whole level
   std::unique_ptr<FitProblem> problem_;
   QualityEnergy* energy_ = nullptr;  ///< owned by the problem, as is the next
   ClosestPointEnergy* surface_ = nullptr;

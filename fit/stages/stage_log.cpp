@@ -16,8 +16,10 @@ const SolvedStage* StageLog::recall(const SolvedStage& begun) {
 }
 
 void StageLog::add(SolvedStage stage) {
-  if (!stages_.empty() && !stages_.back().is_over()) stages_.back() = std::move(stage);
-  else stages_.push_back(std::move(stage));
+  if (!stages_.empty() && !stages_.back().is_over())
+    stages_.back() = std::move(stage);
+  else
+    stages_.push_back(std::move(stage));
   if (on_add) on_add();
 }
 

@@ -10,10 +10,10 @@ namespace subvol::internal {
 
 /// Properties of a surface, estimated from the points of a cloud that lie on it.
 struct CloudGeometry {
-  std::vector<Vec3> normals;   ///< unit, of either sign: the direction in which a point's neighborhood is thinnest
-  std::vector<double> areas;   ///< area of the surface that each point represents, >= 0
-  double area = 0;             ///< their sum, > 0
-  double spacing = 0;          ///< sqrt(area / number of points), > 0
+  std::vector<Vec3> normals;  ///< unit, of either sign: the direction in which a point's neighborhood is thinnest
+  std::vector<double> areas;  ///< area of the surface that each point represents, >= 0
+  double area = 0;            ///< their sum, > 0
+  double spacing = 0;         ///< sqrt(area / number of points), > 0
 };
 
 /// Estimates these properties from the k = min(16, n - 1) nearest neighbors of every point:

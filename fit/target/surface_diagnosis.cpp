@@ -35,8 +35,7 @@ class Diagnostician {
   Diagnostician(const TriangleMesh& surface, const std::function<bool()>& cancelled)
       : cancelled_(cancelled), parts_(surface_parts(surface)), mesh_(parts_.surface.mesh) {
     result_.num_triangles = surface.triangles.size();
-    for (std::size_t i = 0; i < kNumSurfaceFaults; ++i)
-      findings_[i].fault = static_cast<SurfaceFault>(i);
+    for (std::size_t i = 0; i < kNumSurfaceFaults; ++i) findings_[i].fault = static_cast<SurfaceFault>(i);
   }
   SurfaceDiagnosis run();
 
@@ -57,7 +56,10 @@ class Diagnostician {
     return (p[0] + p[1] + p[2]) / 3;
   }
   SurfacePlace place_of(const Vec3& at, Index t, Index other = kNoIndex) const {
-    return {at, std::nullopt, 0, {number(t), other == kNoIndex ? kNoIndex : number(other)},
+    return {at,
+            std::nullopt,
+            0,
+            {number(t), other == kNoIndex ? kNoIndex : number(other)},
             {part(t), other == kNoIndex ? kNoIndex : part(other)}};
   }
   SurfacePlace edge_place(const SurfaceHalfEdge& side, Index other) const {
@@ -119,8 +121,7 @@ void Diagnostician::find_repeated() {
     if (keys[i].first != keys[i - 1].first) continue;
     const Index t = keys[i - 1].second, s = keys[i].second;
     repeated_[t] = repeated_[s] = 1;
-    add(turns(t) == turns(s) ? SurfaceFault::repeated_triangle : SurfaceFault::face_contact,
-        place_of(center(t), t, s));
+    add(turns(t) == turns(s) ? SurfaceFault::repeated_triangle : SurfaceFault::face_contact, place_of(center(t), t, s));
   }
 }
 
@@ -184,8 +185,7 @@ void Diagnostician::find_vertex_contacts() {
       first_fan[v] = fan;
     } else if (fan != first_fan[v]) {
       passed[v] = 1;
-      add(SurfaceFault::vertex_contact,
-          place_of(mesh_.positions[v], first_fan[v] / 3, static_cast<Index>(c / 3)));
+      add(SurfaceFault::vertex_contact, place_of(mesh_.positions[v], first_fan[v] / 3, static_cast<Index>(c / 3)));
     }
   }
 }

@@ -14,35 +14,35 @@ namespace subvol {
 
 /// A kind of fault that may prevent a surface from being filled, or that the user should know of before.
 enum class SurfaceFault {
-  crossing,            ///< pairs of triangles that cross
-  face_contact,        ///< pairs of triangles that overlap in one plane
-  edge_contact,        ///< edges along which the surface touches itself
-  vertex_contact,      ///< points at which the surface touches itself
-  open_rim,            ///< loops of edges of one triangle, longer than those of pinholes
-  pinhole,             ///< short loops of edges of one triangle
-  fin,                 ///< edges of three triangles or more, at a sheet with a rim or where no solid can be told
-  interface,           ///< edges of three triangles or more where sheets divide the inside into regions
-  disagreement,        ///< edges whose two triangles disagree about the outside
-  wall_outward,        ///< parts inside a part that face the way that part faces: walls of voids that point outward
-  part_inward,         ///< parts whose normals point into the solid
-  part_in_void,        ///< solid parts inside a void
-  repeated_triangle,   ///< triangles that are there more than once
-  flat_triangle,       ///< triangles without area
-  thin_wall,           ///< the thinnest wall
-  thin_gap,            ///< the thinnest gap
-  sharp_angle          ///< edges at which the solid, or the space outside, has an angle below `kSharpDegrees`
+  crossing,           ///< pairs of triangles that cross
+  face_contact,       ///< pairs of triangles that overlap in one plane
+  edge_contact,       ///< edges along which the surface touches itself
+  vertex_contact,     ///< points at which the surface touches itself
+  open_rim,           ///< loops of edges of one triangle, longer than those of pinholes
+  pinhole,            ///< short loops of edges of one triangle
+  fin,                ///< edges of three triangles or more, at a sheet with a rim or where no solid can be told
+  interface,          ///< edges of three triangles or more where sheets divide the inside into regions
+  disagreement,       ///< edges whose two triangles disagree about the outside
+  wall_outward,       ///< parts inside a part that face the way that part faces: walls of voids that point outward
+  part_inward,        ///< parts whose normals point into the solid
+  part_in_void,       ///< solid parts inside a void
+  repeated_triangle,  ///< triangles that are there more than once
+  flat_triangle,      ///< triangles without area
+  thin_wall,          ///< the thinnest wall
+  thin_gap,           ///< the thinnest gap
+  sharp_angle         ///< edges at which the solid, or the space outside, has an angle below `kSharpDegrees`
 };
 inline constexpr std::size_t kNumSurfaceFaults = 17;
 
-inline constexpr double kSharpDegrees = 30;    ///< below it no hex at an edge is good: one has 90 degrees when ideal
-inline constexpr double kPinholePercent = 5;   ///< longest rim of a pinhole, in percent of the diagonal: closed unseen
-inline constexpr std::size_t kMostPlaces = 10; ///< places that are listed of each fault
+inline constexpr double kSharpDegrees = 30;     ///< below it no hex at an edge is good: one has 90 degrees when ideal
+inline constexpr double kPinholePercent = 5;    ///< longest rim of a pinhole, in percent of the diagonal: closed unseen
+inline constexpr std::size_t kMostPlaces = 10;  ///< places that are listed of each fault
 
 /// One place of a fault.
 struct SurfacePlace {
   Vec3 at = Vec3::Zero();
-  std::optional<Vec3> to;   ///< the other end of an edge, or the point across a wall or gap
-  double measure = 0;       ///< length of a rim, width of a wall or gap, angle in degrees, volume of a part; else 0
+  std::optional<Vec3> to;  ///< the other end of an edge, or the point across a wall or gap
+  double measure = 0;      ///< length of a rim, width of a wall or gap, angle in degrees, volume of a part; else 0
   std::array<Index, 2> triangles{kNoIndex, kNoIndex};  ///< numbers in the surface that was given
   std::array<Index, 2> parts{kNoIndex, kNoIndex};      ///< parts of these triangles
 };
@@ -67,12 +67,12 @@ struct SurfacePart {
 /// The state of a surface that is to be filled.
 struct SurfaceDiagnosis {
   std::size_t num_triangles = 0;
-  std::size_t num_vertices = 0;   ///< vertices of equal position counted once
-  double diagonal = 0;            ///< of the bounding box
-  double volume = 0;              ///< of the solid; an estimate if the surface is not closed
-  std::vector<SurfacePart> parts; ///< in the order of their first triangles
+  std::size_t num_vertices = 0;          ///< vertices of equal position counted once
+  double diagonal = 0;                   ///< of the bounding box
+  double volume = 0;                     ///< of the solid; an estimate if the surface is not closed
+  std::vector<SurfacePart> parts;        ///< in the order of their first triangles
   std::vector<SurfaceFinding> findings;  ///< in the order of `SurfaceFault`; no fault twice
-  bool is_cancelled = false;      ///< some findings are missing
+  bool is_cancelled = false;             ///< some findings are missing
 
   /// Returns the finding of a fault, or null if there is none.
   const SurfaceFinding* find(SurfaceFault fault) const;

@@ -82,7 +82,8 @@ std::string to_text(const SurfaceFinding& finding, double diagonal) {
   if (finding.places.empty()) return text;
   if (finding.fault == SurfaceFault::open_rim || finding.fault == SurfaceFault::pinhole)
     text += formatted(", %s a rim %.4g long (%.3g %% of the diagonal)", finding.count > 1 ? "the first with" : "with",
-                      place.measure, 100 * place.measure / diagonal) + " around " + to_text(place.at);
+                      place.measure, 100 * place.measure / diagonal) +
+            " around " + to_text(place.at);
   else if (finding.fault == SurfaceFault::sharp_angle)
     text += formatted(", the sharpest of %.3g degrees", place.measure);
   if (finding.fault != SurfaceFault::open_rim && finding.fault != SurfaceFault::pinhole)
@@ -98,9 +99,8 @@ std::string obstacles_for_cells(const SurfaceDiagnosis& diagnosis, double cell) 
   const auto tell = [&](const std::string& cause) { text += (text.empty() ? "" : "; ") + cause; };
   for (const auto& [fault, name] : {std::pair(SurfaceFault::thin_wall, "wall"), {SurfaceFault::thin_gap, "gap"}})
     if (const SurfaceFinding* found = diagnosis.find(fault); found && found->places.front().measure < cell)
-      tell(std::string("the thinnest ") + name + " is " +
-           width_text(found->places.front(), diagnosis.diagonal) + " at " + to_text(found->places.front().at) +
-           formatted(", thinner than a cell (%.4g)", cell));
+      tell(std::string("the thinnest ") + name + " is " + width_text(found->places.front(), diagnosis.diagonal) +
+           " at " + to_text(found->places.front().at) + formatted(", thinner than a cell (%.4g)", cell));
   for (const SurfaceFault fault : {SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::edge_contact,
                                    SurfaceFault::vertex_contact, SurfaceFault::open_rim})
     if (const SurfaceFinding* found = diagnosis.find(fault)) tell(to_text(*found, diagnosis.diagonal));

@@ -14,9 +14,9 @@ namespace subvol {
 
 /// The state of a target, and whether a template can take its topology at all.
 struct TargetReport {
-  std::size_t num_points = 0;     ///< number of points of a cloud; 0: the target is a surface
-  SoupTopology edges;             ///< edges of a surface
-  double area = 0, volume = 0;    ///< in the target's unit; estimates for a cloud
+  std::size_t num_points = 0;   ///< number of points of a cloud; 0: the target is a surface
+  SoupTopology edges;           ///< edges of a surface
+  double area = 0, volume = 0;  ///< in the target's unit; estimates for a cloud
   VolumeSource volume_source = VolumeSource::signed_sum;
   /// Topology of the solids inside target and template. It is set if the target bounds a solid without open or
   /// non-manifold edges, whatever the orientation of its triangles.

@@ -14,10 +14,7 @@ namespace subvol::internal {
 class Fingerprint {
  public:
   template <class T>
-    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
-  Fingerprint& add(T value) {
-    return mix(&value, sizeof value);
-  }
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T> Fingerprint& add(T value) { return mix(&value, sizeof value); }
   /// Adds the length and the bytes of an array, whose values must have no padding.
   template <class T>
   Fingerprint& add(std::span<const T> values) {

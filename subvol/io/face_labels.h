@@ -23,7 +23,7 @@ class FaceLabels {
   struct List {
     std::vector<std::string> names;
     std::unordered_map<std::string, int> places;  ///< of the names
-    std::vector<int> of_face;  ///< a place in `names`; -1: none
+    std::vector<int> of_face;                     ///< a place in `names`; -1: none
     void add(const std::string& name);
     bool tells_apart() const;
   };

@@ -201,9 +201,7 @@ constexpr ForeignFiles kForeignFiles[] = {
      "a mesh of another program: convert it to .vtu or .msh, for instance with meshio or Gmsh"},
 };
 
-std::string_view said(Held held) {
-  return held == Held::none ? "no" : held == Held::numbers ? "numbers" : "names";
-}
+std::string_view said(Held held) { return held == Held::none ? "no" : held == Held::numbers ? "numbers" : "names"; }
 
 /// What is read and what is written, in one word if that is the same.
 std::string both(std::string_view read, std::string_view written) {
@@ -244,15 +242,16 @@ const FileFormat* format_of_path(const std::filesystem::path& path) {
 }
 
 std::string cell_formats_table() {
-  std::string text = "| cells | read | written | orders read | orders written | face groups | regions | features |\n"
-                     "|---|---|---|---|---|---|---|---|\n";
+  std::string text =
+      "| cells | read | written | orders read | orders written | face groups | regions | features |\n"
+      "|---|---|---|---|---|---|---|---|\n";
   for (const FileFormat& format : kFormats)
     if (format.holds_cells)
-      append_row(text, {extension_cell(format), or_no(format.read), or_no(format.written), or_no(format.orders_read),
-                        format.written.empty() ? "no" : or_no(format.orders_written),
-                        both(said(format.groups_read), said(format.groups_written)),
-                        both(said(format.regions_read), said(format.regions_written)),
-                        format.holds_features ? "yes" : "no"});
+      append_row(text,
+                 {extension_cell(format), or_no(format.read), or_no(format.written), or_no(format.orders_read),
+                  format.written.empty() ? "no" : or_no(format.orders_written),
+                  both(said(format.groups_read), said(format.groups_written)),
+                  both(said(format.regions_read), said(format.regions_written)), format.holds_features ? "yes" : "no"});
   return text;
 }
 
@@ -260,9 +259,9 @@ std::string surface_formats_table() {
   std::string text = "| surfaces | read | written | face groups | features |\n|---|---|---|---|---|\n";
   for (const FileFormat& format : kFormats)
     if (!format.holds_cells)
-      append_row(text, {extension_cell(format), or_no(format.read), or_no(format.written),
-                        both(said(format.groups_read), said(format.groups_written)),
-                        format.holds_features ? "yes" : "no"});
+      append_row(text,
+                 {extension_cell(format), or_no(format.read), or_no(format.written),
+                  both(said(format.groups_read), said(format.groups_written)), format.holds_features ? "yes" : "no"});
   return text;
 }
 

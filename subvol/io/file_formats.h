@@ -18,15 +18,15 @@ enum class Held {
 /// A file format, by one of its extensions. This list is the one place that says which formats there are: the readers,
 /// the writers, the program's help and the table of docs/file-formats.md follow it.
 struct FileFormat {
-  std::string_view extension;                   ///< lower case, with its dot
+  std::string_view extension;  ///< lower case, with its dot
   std::string_view name;
-  bool holds_cells = false;                     ///< else a surface
-  std::string_view read{}, written{};           ///< versions, or "yes"; empty: not read, not written
-  std::string_view orders_read{}, orders_written{};  ///< of cells
+  bool holds_cells = false;                                      ///< else a surface
+  std::string_view read{}, written{};                            ///< versions, or "yes"; empty: not read, not written
+  std::string_view orders_read{}, orders_written{};              ///< of cells
   Held groups_read = Held::none, groups_written = Held::none;    ///< groups of faces
   Held regions_read = Held::none, regions_written = Held::none;  ///< references of cells
-  bool holds_features = false;                  ///< creases and corners
-  bool is_scene = false;                        ///< a scene is written: also cutaways and animations
+  bool holds_features = false;                                   ///< creases and corners
+  bool is_scene = false;                                         ///< a scene is written: also cutaways and animations
   /// True if cells of orders 1 and 2 are written, and none of higher ones.
   bool has_quadratic_cells_at_most() const;
   /// True if groups of faces are written and a face may be in several of them; else a face is written in the first one.

@@ -7,8 +7,8 @@
 #include "subvol/base/length_range.h"
 #include "subvol/base/text_scanner.h"
 
-#include <Eigen/Dense>
 #include <zlib.h>
+#include <Eigen/Dense>
 
 #include <algorithm>
 #include <charconv>
@@ -161,10 +161,9 @@ std::string value_in_dict(const std::string& header, const std::string& key, con
 
 ValueType numpy_type(const std::string& text, std::endian& order, const FileText& file) {
   const std::string word = text.size() > 2 ? text.substr(1, text.size() - 2) : "";  // without its quotes
-  static const std::map<std::string, ValueType> kTypes{{"b1", kUInt8},  {"u1", kUInt8},  {"i1", kInt8},
-                                                       {"u2", kUInt16}, {"i2", kInt16},  {"u4", kUInt32},
-                                                       {"i4", kInt32},  {"u8", kUInt64}, {"i8", kInt64},
-                                                       {"f4", kFloat32}, {"f8", kFloat64}};
+  static const std::map<std::string, ValueType> kTypes{
+      {"b1", kUInt8}, {"u1", kUInt8},  {"i1", kInt8},  {"u2", kUInt16},  {"i2", kInt16},  {"u4", kUInt32},
+      {"i4", kInt32}, {"u8", kUInt64}, {"i8", kInt64}, {"f4", kFloat32}, {"f8", kFloat64}};
   const auto at = word.size() == 3 ? kTypes.find(word.substr(1)) : kTypes.end();
   if (at == kTypes.end()) refuse_type(in_quotes(word), file);
   order = word[0] == '>' ? std::endian::big : std::endian::little;
@@ -205,16 +204,23 @@ LabelGrid read_numpy(const std::string& bytes, const FileText& file) {
 // NRRD
 
 ValueType nrrd_type(const std::string& text, const FileText& file) {
-  static const std::map<std::string, ValueType> kTypes{
-      {"signed char", kInt8},    {"int8", kInt8},          {"int8_t", kInt8},        {"uchar", kUInt8},
-      {"unsigned char", kUInt8}, {"uint8", kUInt8},        {"uint8_t", kUInt8},      {"short", kInt16},
-      {"short int", kInt16},     {"signed short", kInt16}, {"int16", kInt16},        {"int16_t", kInt16},
-      {"ushort", kUInt16},       {"unsigned short", kUInt16}, {"uint16", kUInt16},   {"uint16_t", kUInt16},
-      {"int", kInt32},           {"signed int", kInt32},   {"int32", kInt32},        {"int32_t", kInt32},
-      {"uint", kUInt32},         {"unsigned int", kUInt32}, {"uint32", kUInt32},     {"uint32_t", kUInt32},
-      {"longlong", kInt64},      {"long long", kInt64},    {"int64", kInt64},        {"int64_t", kInt64},
-      {"ulonglong", kUInt64},    {"unsigned long long", kUInt64}, {"uint64", kUInt64}, {"uint64_t", kUInt64},
-      {"float", kFloat32},       {"double", kFloat64}};
+  static const std::map<std::string, ValueType> kTypes{{"signed char", kInt8},    {"int8", kInt8},
+                                                       {"int8_t", kInt8},         {"uchar", kUInt8},
+                                                       {"unsigned char", kUInt8}, {"uint8", kUInt8},
+                                                       {"uint8_t", kUInt8},       {"short", kInt16},
+                                                       {"short int", kInt16},     {"signed short", kInt16},
+                                                       {"int16", kInt16},         {"int16_t", kInt16},
+                                                       {"ushort", kUInt16},       {"unsigned short", kUInt16},
+                                                       {"uint16", kUInt16},       {"uint16_t", kUInt16},
+                                                       {"int", kInt32},           {"signed int", kInt32},
+                                                       {"int32", kInt32},         {"int32_t", kInt32},
+                                                       {"uint", kUInt32},         {"unsigned int", kUInt32},
+                                                       {"uint32", kUInt32},       {"uint32_t", kUInt32},
+                                                       {"longlong", kInt64},      {"long long", kInt64},
+                                                       {"int64", kInt64},         {"int64_t", kInt64},
+                                                       {"ulonglong", kUInt64},    {"unsigned long long", kUInt64},
+                                                       {"uint64", kUInt64},       {"uint64_t", kUInt64},
+                                                       {"float", kFloat32},       {"double", kFloat64}};
   const auto at = kTypes.find(text);
   if (at == kTypes.end()) refuse_type(in_quotes(text), file);
   return at->second;
@@ -291,8 +297,7 @@ LabelGrid read_nrrd(const std::string& bytes, const FileText& file) {
     take_labels(grid, inflated(rest, size, file), type, order, file);
   } else if (encoding == "ascii" || encoding == "text" || encoding == "txt") {
     std::string doubles;
-    for (const double number : numbers_in(rest))
-      doubles.append(reinterpret_cast<const char*>(&number), sizeof number);
+    for (const double number : numbers_in(rest)) doubles.append(reinterpret_cast<const char*>(&number), sizeof number);
     if (doubles.size() / sizeof(double) * type.size < size)
       file.fail("it holds " + std::to_string(doubles.size() / sizeof(double)) + " numbers, expected " +
                 std::to_string(size / type.size) + ", one for each voxel");

@@ -114,18 +114,10 @@ bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
 void turn_over(VolumeMesh& mesh, std::size_t c) {
   const auto corner = [&](std::size_t i) -> Index& { return mesh.cell_vertices[mesh.cell_offsets[c] + i]; };
   switch (mesh.kinds[c]) {
-    case CellKind::hex:
-      std::swap(corner(5), corner(7));
-      [[fallthrough]];
-    case CellKind::pyramid:
-      std::swap(corner(1), corner(3));
-      break;
-    case CellKind::prism:
-      std::swap(corner(4), corner(5));
-      [[fallthrough]];
-    case CellKind::tet:
-      std::swap(corner(1), corner(2));
-      break;
+    case CellKind::hex: std::swap(corner(5), corner(7)); [[fallthrough]];
+    case CellKind::pyramid: std::swap(corner(1), corner(3)); break;
+    case CellKind::prism: std::swap(corner(4), corner(5)); [[fallthrough]];
+    case CellKind::tet: std::swap(corner(1), corner(2)); break;
   }
 }
 
@@ -155,7 +147,8 @@ void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
   if (mend) mesh = std::move(turned);
   parsed.warnings.push_back((all ? "all " : "all prisms, ") + std::to_string(count) +
                             " cells are left-handed at every corner, as of a mirrored mesh or of other numbering: "
-                            "their corners " + (mend ? "are" : "are not") + " numbered anew");
+                            "their corners " +
+                            (mend ? "are" : "are not") + " numbered anew");
 }
 
 }  // namespace

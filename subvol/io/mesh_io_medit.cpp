@@ -196,8 +196,8 @@ class MeditParser {
       const std::size_t line = scan_.word_line();
       const int reference = read_reference("a face reference");
       if (reference == 0) continue;
-      parsed_.mesh.face_groups.faces.push_back({face_key({face.data(), section.corners}),
-                                                face_groups_.by_number(reference)});
+      parsed_.mesh.face_groups.faces.push_back(
+          {face_key({face.data(), section.corners}), face_groups_.by_number(reference)});
       last_face_line_ = line;
     }
   }
@@ -263,7 +263,8 @@ class MeditParser {
     const std::size_t end = std::min(text.find_first_of(kMeditBlanks, begin), text.size());
     const auto number = parse_integer(text.substr(begin, end - begin));
     const std::size_t name = text.find_first_not_of(kMeditBlanks, end);
-    const bool fits = number && *number >= std::numeric_limits<int>::min() && *number <= std::numeric_limits<int>::max();
+    const bool fits =
+        number && *number >= std::numeric_limits<int>::min() && *number <= std::numeric_limits<int>::max();
     if (!fits || name == text.npos) scan_.fail("expected '#" + std::string(opening) + " NUMBER NAME'");
     const std::size_t last = text.find_last_not_of(kMeditBlanks);
     return {std::string(text.substr(name, last + 1 - name)), static_cast<int>(*number), opening == kCellName ? 3 : 2};
@@ -336,7 +337,8 @@ class MeditParser {
 void append_name(std::string& text, std::string_view opening, const Group& group) {
   if (group.name.find_first_not_of(" \t\r\n") == group.name.npos) return;
   std::string name = group.name;
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   text.append("#").append(opening).append(" ").append(std::to_string(group.number)).append(" ").append(name) += '\n';
 }
 

@@ -24,11 +24,21 @@ struct VtkType {
   ValueType type;
 };
 constexpr VtkType kVtkTypes[] = {
-    {"float", kFloat32},       {"double", kFloat64},        {"char", kInt8},
-    {"signed_char", kInt8},    {"unsigned_char", kUInt8},   {"short", kInt16},
-    {"unsigned_short", kUInt16}, {"int", kInt32},           {"unsigned_int", kUInt32},
-    {"long", kInt64},          {"unsigned_long", kUInt64},  {"vtkidtype", kInt32},
-    {"vtktypeint64", kInt64},  {"vtktypeint32", kInt32},    {"vtktypeuint64", kUInt64},
+    {"float", kFloat32},
+    {"double", kFloat64},
+    {"char", kInt8},
+    {"signed_char", kInt8},
+    {"unsigned_char", kUInt8},
+    {"short", kInt16},
+    {"unsigned_short", kUInt16},
+    {"int", kInt32},
+    {"unsigned_int", kUInt32},
+    {"long", kInt64},
+    {"unsigned_long", kUInt64},
+    {"vtkidtype", kInt32},
+    {"vtktypeint64", kInt64},
+    {"vtktypeint32", kInt32},
+    {"vtktypeuint64", kUInt64},
     {"vtktypeuint32", kUInt32},
 };
 
@@ -41,9 +51,16 @@ struct VtkAttribute {
   bool is_colors = false;  ///< bytes in binary files, fractions in text
 };
 constexpr VtkAttribute kSkippedAttributes[] = {
-    {"vectors", 3},    {"normals", 3},      {"tensors", 9},    {"tensors6", 6},
-    {"global_ids", 1}, {"pedigree_ids", 1}, {"edge_flags", 1}, {"texture_coordinates", 0},
-    {"color_scalars", 0, true}, {"lookup_table", 4, true},
+    {"vectors", 3},
+    {"normals", 3},
+    {"tensors", 9},
+    {"tensors6", 6},
+    {"global_ids", 1},
+    {"pedigree_ids", 1},
+    {"edge_flags", 1},
+    {"texture_coordinates", 0},
+    {"color_scalars", 0, true},
+    {"lookup_table", 4, true},
 };
 
 class VtkParser {
@@ -55,14 +72,22 @@ class VtkParser {
     read_header();
     while (const auto word = scan_.next()) {
       const std::string keyword = lower_case(*word);
-      if (keyword == "points") read_points();
-      else if (keyword == "cells") read_cells();
-      else if (keyword == "cell_types") read_cell_types();
-      else if (keyword == "cell_data") read_attributes(num_cells_, true);
-      else if (keyword == "point_data") read_attributes(mesh_.positions.size(), false);
-      else if (keyword == "field") read_field(false);
-      else if (keyword == "metadata") skip_metadata();
-      else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
+      if (keyword == "points")
+        read_points();
+      else if (keyword == "cells")
+        read_cells();
+      else if (keyword == "cell_types")
+        read_cell_types();
+      else if (keyword == "cell_data")
+        read_attributes(num_cells_, true);
+      else if (keyword == "point_data")
+        read_attributes(mesh_.positions.size(), false);
+      else if (keyword == "field")
+        read_field(false);
+      else if (keyword == "metadata")
+        skip_metadata();
+      else
+        scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
       if (stray_attribute_) break;  // the mesh itself comes before its attributes
     }
     if (!has_points_) scan_.fail("the file ends without POINTS");
@@ -226,10 +251,14 @@ class VtkParser {
       const std::string keyword = lower_case(*word);
       if (keyword == "cell_data" || keyword == "point_data") return;
       scan_.next();
-      if (keyword == "scalars") read_scalars(expected, of_cells);
-      else if (keyword == "field") read_field(of_cells);
-      else if (keyword == "metadata") skip_metadata();
-      else if (!skip_attribute(keyword, expected, of_cells)) end_attributes(*word);
+      if (keyword == "scalars")
+        read_scalars(expected, of_cells);
+      else if (keyword == "field")
+        read_field(of_cells);
+      else if (keyword == "metadata")
+        skip_metadata();
+      else if (!skip_attribute(keyword, expected, of_cells))
+        end_attributes(*word);
     }
   }
 
@@ -242,12 +271,13 @@ class VtkParser {
     std::size_t components = attribute->components;
     if (components == 0) components = read_count("the number of components");
     if (keyword == "lookup_table") n = read_count("the size of a lookup table");
-    const auto type = attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32)
-                                           : type_of(scan_.word("a data type"));
+    const auto type =
+        attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32) : type_of(scan_.word("a data type"));
     if (!type) return false;
-    if (keyword == "lookup_table") read_array(n, components, *type, "", Array::no_data);
-    else read_array(n, components, *type, name,
-                    of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
+    if (keyword == "lookup_table")
+      read_array(n, components, *type, "", Array::no_data);
+    else
+      read_array(n, components, *type, name, of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
     return true;
   }
 
@@ -344,8 +374,8 @@ class VtkParser {
     for (std::size_t i = 0; i < word.size(); ++i) {
       int code = 0;
       const char* digits = word.data() + i + 1;
-      const bool is_code = word[i] == '%' && i + 2 < word.size() &&
-                           std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
+      const bool is_code =
+          word[i] == '%' && i + 2 < word.size() && std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
       name += is_code ? static_cast<char>(code) : word[i];
       i += is_code ? 2 : 0;
     }
@@ -412,8 +442,8 @@ class VtkParser {
   TextScanner scan_;
   std::string name_, asked_;
   NodalMesh mesh_;
-  std::vector<CellNumbers> arrays_;   ///< arrays from which the references may be chosen
-  std::vector<std::string> others_;   ///< names of the other cell data
+  std::vector<CellNumbers> arrays_;  ///< arrays from which the references may be chosen
+  std::vector<std::string> others_;  ///< names of the other cell data
   int major_ = 0;
   bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false,
        old_numbers_ = false;

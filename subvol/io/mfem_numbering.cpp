@@ -27,20 +27,16 @@ const MfemTopology& topology_of(CellKind kind) {
                                  {{1, 2, 3, -1}, {0, 3, 2, -1}, {0, 1, 3, -1}, {0, 2, 1, -1}}};
   static const MfemTopology kPrism{{{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}},
                                    {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}}};
-  static const MfemTopology kHex{{{0, 1}, {1, 2}, {3, 2}, {0, 3}, {4, 5}, {5, 6}, {7, 6}, {4, 7}, {0, 4}, {1, 5},
-                                  {2, 6}, {3, 7}},
-                                 {{3, 2, 1, 0}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}}};
+  static const MfemTopology kHex{
+      {{0, 1}, {1, 2}, {3, 2}, {0, 3}, {4, 5}, {5, 6}, {7, 6}, {4, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
+      {{3, 2, 1, 0}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}}};
   static const MfemTopology kPyramid{{{0, 1}, {1, 2}, {3, 2}, {0, 3}, {0, 4}, {1, 4}, {2, 4}, {3, 4}},
                                      {{3, 2, 1, 0}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}};
   switch (kind) {
-    case CellKind::tet:
-      return kTet;
-    case CellKind::prism:
-      return kPrism;
-    case CellKind::pyramid:
-      return kPyramid;
-    case CellKind::hex:
-      break;
+    case CellKind::tet: return kTet;
+    case CellKind::prism: return kPrism;
+    case CellKind::pyramid: return kPyramid;
+    case CellKind::hex: break;
   }
   return kHex;
 }

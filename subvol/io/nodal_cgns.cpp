@@ -92,24 +92,16 @@ struct CellType {
 
 std::optional<CellType> cell_type(CGNS_ENUMT(ElementType_t) type) {
   switch (type) {
-    case CGNS_ENUMV(TETRA_4):
-      return CellType{CellKind::tet, 1};
-    case CGNS_ENUMV(TETRA_10):
-      return CellType{CellKind::tet, 2};
-    case CGNS_ENUMV(PENTA_6):
-      return CellType{CellKind::prism, 1};
+    case CGNS_ENUMV(TETRA_4): return CellType{CellKind::tet, 1};
+    case CGNS_ENUMV(TETRA_10): return CellType{CellKind::tet, 2};
+    case CGNS_ENUMV(PENTA_6): return CellType{CellKind::prism, 1};
     case CGNS_ENUMV(PENTA_15):
-    case CGNS_ENUMV(PENTA_18):
-      return CellType{CellKind::prism, 2};
-    case CGNS_ENUMV(PYRA_5):
-      return CellType{CellKind::pyramid, 1};
-    case CGNS_ENUMV(HEXA_8):
-      return CellType{CellKind::hex, 1};
+    case CGNS_ENUMV(PENTA_18): return CellType{CellKind::prism, 2};
+    case CGNS_ENUMV(PYRA_5): return CellType{CellKind::pyramid, 1};
+    case CGNS_ENUMV(HEXA_8): return CellType{CellKind::hex, 1};
     case CGNS_ENUMV(HEXA_20):
-    case CGNS_ENUMV(HEXA_27):
-      return CellType{CellKind::hex, 2};
-    default:
-      return std::nullopt;
+    case CGNS_ENUMV(HEXA_27): return CellType{CellKind::hex, 2};
+    default: return std::nullopt;
   }
 }
 
@@ -428,8 +420,8 @@ class CgnsParser {
   LeftOut left_out_;
   GroupList groups_;
   std::vector<CellSection> sections_;
-  std::map<Type, std::vector<std::size_t>> places_;  ///< `cgns_places` of the types of cells
-  std::vector<Index> nodes_;                         ///< of the element that is being read
+  std::map<Type, std::vector<std::size_t> > places_;  ///< `cgns_places` of the types of cells
+  std::vector<Index> nodes_;                          ///< of the element that is being read
   // These members describe the zone that is being read.
   std::string zone_name_;
   std::size_t first_node_ = 0, num_nodes_ = 0;

@@ -188,7 +188,7 @@ class ExodusParser {
   struct Block {
     std::string name;
     long long id;
-    std::optional<CellKind> kind;        ///< none: elements that are no cells
+    std::optional<CellKind> kind;  ///< none: elements that are no cells
     std::size_t num_elements, first_cell;
     long long first_element = 1;  ///< its number: elements are numbered from 1 through all blocks
   };
@@ -266,8 +266,7 @@ class ExodusParser {
       file_.fail(connect + ": " + in_quotes(type) + " with " + std::to_string(size) +
                  " nodes is not read, expected HEX8, 20, 27, WEDGE6, 15, 18, TET4, 10 or PYRAMID5");
     const std::vector<std::size_t> places = exodus_places(kind, size);
-    const std::vector<long long> nodes =
-        file_.integers(connect, file_.size_of(connect, block.num_elements, size));
+    const std::vector<long long> nodes = file_.integers(connect, file_.size_of(connect, block.num_elements, size));
     std::vector<Index> cell(size);
     for (std::size_t e = 0; e < block.num_elements; ++e) {
       for (std::size_t i = 0; i < size; ++i) {

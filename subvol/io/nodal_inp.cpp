@@ -109,7 +109,8 @@ class InpParser {
     for (std::size_t k = 1; k < fields.size() && k < 4; ++k) {
       if (fields[k].empty()) continue;
       std::string text = fields[k];
-      std::replace_if(text.begin(), text.end(), [](char c) { return c == 'd' || c == 'D'; }, 'e');
+      std::replace_if(
+          text.begin(), text.end(), [](char c) { return c == 'd' || c == 'D'; }, 'e');
       const auto value = parse_number(text);
       if (!value) fail("expected a coordinate (a finite number), found " + in_quotes(fields[k]));
       p[static_cast<Eigen::Index>(k - 1)] = *value;
@@ -254,8 +255,8 @@ class InpParser {
   void read_surface(const std::vector<std::string>& fields) {
     if (surface_ == kNoIndex) return;
     const std::string side = fields.size() > 1 ? upper_case(fields[1]) : "";
-    const auto number = side.size() == 2 && side[0] == 'S' ? parse_integer(std::string_view(side).substr(1))
-                                                            : std::nullopt;
+    const auto number =
+        side.size() == 2 && side[0] == 'S' ? parse_integer(std::string_view(side).substr(1)) : std::nullopt;
     if (!number) {
       content_.left_out.add("lines of surfaces without a face S1 to S6");
       return;

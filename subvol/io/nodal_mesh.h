@@ -31,21 +31,19 @@ enum class NodeSpacing {
 struct NodalMesh {
   std::vector<Vec3> positions;
   std::vector<CellKind> kinds;
-  std::vector<int> orders;                 ///< one per cell, from 1 on
-  std::vector<std::size_t> offsets{0};     ///< num_cells() + 1 entries into nodes
+  std::vector<int> orders;              ///< one per cell, from 1 on
+  std::vector<std::size_t> offsets{0};  ///< num_cells() + 1 entries into nodes
   std::vector<Index> nodes;
-  std::vector<int> references;             ///< one per cell, or empty (all 0)
-  std::vector<Group> regions;              ///< names of references, where there are any
-  VolumeFaceGroups face_groups;            ///< by the corners of faces
-  PolygonMesh shells;                      ///< without cells: elements of two dimensions by their corners, which are
-                                           ///< numbers of nodes; it has no positions of its own (.msh, .inp, .bdf)
+  std::vector<int> references;   ///< one per cell, or empty (all 0)
+  std::vector<Group> regions;    ///< names of references, where there are any
+  VolumeFaceGroups face_groups;  ///< by the corners of faces
+  PolygonMesh shells;            ///< without cells: elements of two dimensions by their corners, which are
+                                 ///< numbers of nodes; it has no positions of its own (.msh, .inp, .bdf)
   NodeSpacing spacing = NodeSpacing::equal;
-  std::vector<std::string> warnings;       ///< without the file's name
+  std::vector<std::string> warnings;  ///< without the file's name
 
   std::size_t num_cells() const { return kinds.size(); }
-  std::span<const Index> cell(std::size_t c) const {
-    return {nodes.data() + offsets[c], offsets[c + 1] - offsets[c]};
-  }
+  std::span<const Index> cell(std::size_t c) const { return {nodes.data() + offsets[c], offsets[c + 1] - offsets[c]}; }
   int max_order() const;
 };
 

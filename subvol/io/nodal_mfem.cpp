@@ -139,7 +139,8 @@ class MfemParser {
     for (std::int64_t v = 0; v < n; ++v) mesh_.positions.push_back(read_position());
     NodalCells cells(mesh_);
     for (std::size_t c = 0; c < kinds_.size(); ++c)
-      cells.add(kinds_[c], 1, NodeOrdering::vtk, std::span(corners_).subspan(offsets_[c], offsets_[c + 1] - offsets_[c]));
+      cells.add(kinds_[c], 1, NodeOrdering::vtk,
+                std::span(corners_).subspan(offsets_[c], offsets_[c + 1] - offsets_[c]));
   }
 
   Vec3 read_position() {
@@ -162,7 +163,8 @@ class MfemParser {
     if (name == "Linear") return space;
     if (name == "Quadratic") return {2, true, NodeSpacing::equal};
     if (name == "Cubic") return {3, true, NodeSpacing::equal, true};
-    for (const auto& [prefix, is_continuous] : {std::pair{"H1_3D_P", true}, {"H1@G_3D_P", true}, {"L2_T1_3D_P", false}}) {
+    for (const auto& [prefix, is_continuous] :
+         {std::pair{"H1_3D_P", true}, {"H1@G_3D_P", true}, {"L2_T1_3D_P", false}}) {
       if (!name.starts_with(prefix)) continue;
       const auto order = parse_integer(std::string_view(name).substr(std::string_view(prefix).size()));
       constexpr int kMostOrder = 16;
@@ -185,9 +187,8 @@ class MfemParser {
       least += space.is_continuous && space.order > 2 ? num_lattice_points(kind, space.order - 2) / 8 : 1;
     if (least > scan_.bytes_left()) scan_.fail("the file ends within the nodes");
     mesh_.spacing = space.order > 2 ? space.spacing : NodeSpacing::equal;
-    MfemNodes nodes = space.is_continuous
-                          ? number_mfem_nodes(num_vertices, kinds_, offsets_, corners_, space.order)
-                          : separate_nodes(space.order);
+    MfemNodes nodes = space.is_continuous ? number_mfem_nodes(num_vertices, kinds_, offsets_, corners_, space.order)
+                                          : separate_nodes(space.order);
     std::vector<Vec3> values = read_values(nodes.count, ordering == "1");
     if (space.is_old_cubic) turn_inner_nodes(nodes);
     if (!space.is_continuous) join_corners(num_vertices, nodes, values);
@@ -246,7 +247,8 @@ class MfemParser {
         if (i >= offsets_[c + 1] - offsets_[c]) continue;
         const Index vertex = corners_[offsets_[c] + i];
         if (is_placed[static_cast<std::size_t>(vertex)] && all[static_cast<std::size_t>(vertex)] != position)
-          scan_.fail("vertex " + std::to_string(vertex) + " is at two places, as in a periodic mesh, which is not read");
+          scan_.fail("vertex " + std::to_string(vertex) +
+                     " is at two places, as in a periodic mesh, which is not read");
         all[static_cast<std::size_t>(vertex)] = position;
         is_placed[static_cast<std::size_t>(vertex)] = true;
         node = vertex;

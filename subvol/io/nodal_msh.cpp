@@ -63,25 +63,21 @@ int dimension(Shape shape) {
 
 CellKind kind_of(Shape shape) {
   switch (shape) {
-    case Shape::tet:
-      return CellKind::tet;
-    case Shape::prism:
-      return CellKind::prism;
-    case Shape::pyramid:
-      return CellKind::pyramid;
-    default:
-      return CellKind::hex;
+    case Shape::tet: return CellKind::tet;
+    case Shape::prism: return CellKind::prism;
+    case Shape::pyramid: return CellKind::pyramid;
+    default: return CellKind::hex;
   }
 }
 
 /// An element with the tags of its nodes still unresolved: nodes may come after elements.
 struct Element {
   const MshType* type;
-  int physical;           ///< number of its first physical group, 0: none
+  int physical;                  ///< number of its first physical group, 0: none
   const std::vector<int>* more;  ///< all of them, or null: only that one
-  std::int64_t entity;    ///< the part of the geometry that it is on
+  std::int64_t entity;           ///< the part of the geometry that it is on
   std::size_t line;
-  std::size_t first_node; ///< in the list of all elements' nodes
+  std::size_t first_node;  ///< in the list of all elements' nodes
 };
 
 class MshParser {
@@ -92,13 +88,20 @@ class MshParser {
     read_format();
     while (const auto word = scan_.next()) {
       const std::string section(*word);
-      if (section == "$Nodes") read_nodes();
-      else if (section == "$Elements") read_elements();
-      else if (section == "$PhysicalNames") read_physical_names();
-      else if (section == "$Entities") read_entities();
-      else if (section == "$PartitionedEntities") skip_partitions();
-      else if (section.starts_with("$")) skip_section(section);
-      else scan_.fail("expected a section such as $Nodes, found " + in_quotes(*word));
+      if (section == "$Nodes")
+        read_nodes();
+      else if (section == "$Elements")
+        read_elements();
+      else if (section == "$PhysicalNames")
+        read_physical_names();
+      else if (section == "$Entities")
+        read_entities();
+      else if (section == "$PartitionedEntities")
+        skip_partitions();
+      else if (section.starts_with("$"))
+        skip_section(section);
+      else
+        scan_.fail("expected a section such as $Nodes, found " + in_quotes(*word));
     }
     if (!has_nodes_) scan_.fail("the file ends without $Nodes");
     if (!has_elements_) scan_.fail("the file ends without $Elements");
@@ -126,9 +129,12 @@ class MshParser {
     if (binary_) {
       scan_.line();
       const std::string_view one = scan_.bytes(4, "the number 1");
-      if (decode(one.data(), kInt32, std::endian::little) == 1) endian_ = std::endian::little;
-      else if (decode(one.data(), kInt32, std::endian::big) == 1) endian_ = std::endian::big;
-      else scan_.fail("expected the number 1 in four bytes after the format");
+      if (decode(one.data(), kInt32, std::endian::little) == 1)
+        endian_ = std::endian::little;
+      else if (decode(one.data(), kInt32, std::endian::big) == 1)
+        endian_ = std::endian::big;
+      else
+        scan_.fail("expected the number 1 in four bytes after the format");
     }
     end_section("$MeshFormat");
   }
@@ -218,8 +224,10 @@ class MshParser {
 
   /// Boxes of entities do not matter, and may be infinite.
   void read_box_coordinate() {
-    if (binary_) scan_.bytes(8, "a coordinate");
-    else scan_.word("a coordinate");
+    if (binary_)
+      scan_.bytes(8, "a coordinate");
+    else
+      scan_.word("a coordinate");
   }
 
   void add_node(std::int64_t tag, const Vec3& position) {
@@ -272,8 +280,8 @@ class MshParser {
   }
 
   const MshType& type_of(std::int64_t type) {
-    const auto found = std::find_if(std::begin(kMshTypes), std::end(kMshTypes),
-                                    [&](const MshType& t) { return t.type == type; });
+    const auto found =
+        std::find_if(std::begin(kMshTypes), std::end(kMshTypes), [&](const MshType& t) { return t.type == type; });
     if (found == std::end(kMshTypes)) scan_.fail("elements of Gmsh's type " + std::to_string(type) + " are not read");
     if (found->shape == Shape::pyramid && found->order > 1)
       scan_.fail(std::string("a curved pyramid: ") + kNoCurvedPyramids);
@@ -364,8 +372,10 @@ class MshParser {
       if (!is_cell(element)) {
         const std::size_t corners = element.type->shape == Shape::quad ? 4 : 3;
         const auto add = [&](int group) { add_face(mesh_, std::span(nodes).first(corners), faces.by_number(group)); };
-        if (element.more) std::for_each(element.more->begin(), element.more->end(), add);
-        else add(element.physical);
+        if (element.more)
+          std::for_each(element.more->begin(), element.more->end(), add);
+        else
+          add(element.physical);
         continue;
       }
       cells.add(kind_of(element.type->shape), element.type->order, NodeOrdering::gmsh, nodes);
@@ -463,8 +473,8 @@ class MshParser {
   bool is_old_ = false, is_4_1_ = false, binary_ = false, has_nodes_ = false, has_elements_ = false;
   std::endian endian_ = std::endian::little;
   ValueType size_type_ = kUInt64;
-  std::unordered_map<std::int64_t, Index> numbers_;             ///< of nodes by their tags
-  std::array<std::map<int, std::string>, 4> names_;             ///< of physical groups, by dimension
+  std::unordered_map<std::int64_t, Index> numbers_;                   ///< of nodes by their tags
+  std::array<std::map<int, std::string>, 4> names_;                   ///< of physical groups, by dimension
   std::array<std::map<std::int64_t, std::vector<int>>, 4> physical_;  ///< groups of entities
   std::map<int, int> own_references_;                                 ///< of groups of cells
   std::vector<Element> elements_;

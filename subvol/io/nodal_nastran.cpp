@@ -211,8 +211,7 @@ class NastranParser {
       for (std::size_t b = a + 1; b < corners; ++b)
         if (lattice[a] + lattice[b] == 2 * lattice[i] && ends.empty()) ends = {nodes[a], nodes[b]};
     std::sort(ends.begin(), ends.end());
-    const auto [known, is_new] =
-        middles_.try_emplace({ends[0], ends[1]}, static_cast<Index>(mesh_.positions.size()));
+    const auto [known, is_new] = middles_.try_emplace({ends[0], ends[1]}, static_cast<Index>(mesh_.positions.size()));
     if (is_new) mesh_.positions.push_back((mesh_.positions[ends[0]] + mesh_.positions[ends[1]]) / 2);
     return known->second;
   }

@@ -48,8 +48,8 @@ struct Side {
 
 /// The faces of one group.
 struct GroupSides {
-  std::vector<Side> sides;     ///< each of the first cell that has it
-  std::vector<Index> nodes;    ///< of all of them, ascending
+  std::vector<Side> sides;   ///< each of the first cell that has it
+  std::vector<Index> nodes;  ///< of all of them, ascending
 };
 
 /// Returns the faces of each group that the mesh has.

@@ -62,7 +62,8 @@ class VtuParser {
           continue;  // what a reader of meshes does not need may be in a form that it does not know
         }
         if (found.size() != (is_on_points ? mesh_size_ : is_volume_.size())) continue;
-        if (is_on_points) one.values = std::move(found);
+        if (is_on_points)
+          one.values = std::move(found);
         else
           for (std::size_t c = 0; c < found.size(); ++c)
             if (is_volume_[c]) one.values.push_back(found[c]);
@@ -145,8 +146,7 @@ class VtuParser {
       const int components = node.attribute("NumberOfComponents").as_int(1);
       const bool is_real = described_array.type.starts_with("Float");
       CellNumbers numbers{described_array.name, is_real, {}};
-      if (components == 1)
-        try {
+      if (components == 1) try {
           for (const double value : decode_vtk_xml_array(described_array, file_.storage())) {
             if (value != std::floor(value)) break;  // also of what is not a number
             numbers.values.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
@@ -156,8 +156,10 @@ class VtuParser {
         }
       num_arrays_ += !is_derived(numbers, num_cells);
       if (numbers.name == "order" && asked_ != "order") continue;  // ours: it says nothing about materials
-      if (numbers.values.size() == num_cells) keep(std::move(numbers));
-      else others_.push_back(described_array.name);
+      if (numbers.values.size() == num_cells)
+        keep(std::move(numbers));
+      else
+        others_.push_back(described_array.name);
     }
   }
 
@@ -250,8 +252,8 @@ class VtuParser {
   VtkXmlFile file_;
   std::string asked_;
   NodalMesh mesh_;
-  std::vector<bool> is_volume_;           ///< of all cells of the file: whether it is one of the mesh
-  std::vector<std::size_t> beziers_;      ///< cells that are given by their control points
+  std::vector<bool> is_volume_;       ///< of all cells of the file: whether it is one of the mesh
+  std::vector<std::size_t> beziers_;  ///< cells that are given by their control points
   std::vector<CellNumbers> arrays_;
   std::vector<std::string> others_;
   std::size_t num_arrays_ = 0, num_left_out_ = 0, num_skipped_ = 0, num_cells_read_ = 0, mesh_size_ = 0;

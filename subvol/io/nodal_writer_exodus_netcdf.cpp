@@ -22,9 +22,7 @@ namespace subvol::internal {
 
 #ifndef SUBVOL_NETCDF
 
-std::string exodus_bytes(const NodalMesh&) {
-  throw InputError(kNoNetcdf);
-}
+std::string exodus_bytes(const NodalMesh&) { throw InputError(kNoNetcdf); }
 
 #else
 

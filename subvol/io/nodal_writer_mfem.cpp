@@ -41,8 +41,8 @@ void append_boundary(std::string& text, const VolumeMesh& mesh) {
       for (int f = 0; f < topology.num_faces; ++f) {
         corners.clear();
         for (int i = 0; i < topology.face_sizes[static_cast<std::size_t>(f)]; ++i)
-          corners.push_back(mesh.cell(c)[static_cast<std::size_t>(
-              topology.faces[static_cast<std::size_t>(f)][static_cast<std::size_t>(i)])]);
+          corners.push_back(mesh.cell(
+              c)[static_cast<std::size_t>(topology.faces[static_cast<std::size_t>(f)][static_cast<std::size_t>(i)])]);
         visit(corners);
       }
     }

@@ -80,12 +80,18 @@ void append_geometry(std::string& text, const NodalMesh& mesh) {
 std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
-    if (c == '&') result += "&amp;";
-    else if (c == '<') result += "&lt;";
-    else if (c == '>') result += "&gt;";
-    else if (c == '"') result += "&quot;";
-    else if (static_cast<unsigned char>(c) < ' ') result += ' ';
-    else result += c;
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else if (c == '"')
+      result += "&quot;";
+    else if (static_cast<unsigned char>(c) < ' ')
+      result += ' ';
+    else
+      result += c;
   }
   return result;
 }
@@ -102,8 +108,8 @@ void append_names(std::string& text, const std::vector<Group>& groups) {
 
 std::string document(const NodalMesh& mesh, const std::string& name, const XdmfGrid& grid, const std::string& attribute,
                      const std::vector<Group>& names) {
-  std::string text = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n<Grid Name=\"" + name +
-                     "\" GridType=\"Uniform\">\n";
+  std::string text =
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n<Grid Name=\"" + name + "\" GridType=\"Uniform\">\n";
   append_topology(text, grid);
   append_geometry(text, mesh);
   if (!grid.numbers.empty()) {
@@ -155,8 +161,10 @@ std::string xdmf_faces_text(const NodalMesh& mesh) {
       corners.clear();
       for (const int i : face) corners.push_back(mesh.cell(c)[static_cast<std::size_t>(i)]);
       const auto [known, is_new] = faces.try_emplace(face_key(corners), Face{c, &face, false});
-      if (is_new) in_order.push_back(known->first);
-      else known->second.is_inner = true;
+      if (is_new)
+        in_order.push_back(known->first);
+      else
+        known->second.is_inner = true;
     }
   XdmfGrid grid;
   for (const FaceKey& key : in_order) {

@@ -36,8 +36,8 @@ std::vector<double> lobatto_points(int order) {
     constexpr int kMostLobattoNewtonSteps = 20;  // it takes five or less
     for (int step = 0; step < kMostLobattoNewtonSteps && 2 * i < order; ++step) {
       const auto [value, before] = legendre(order, x);
-      const double slope = order * (before - x * value) / (1 - x * x);                      // P'_n
-      const double curvature = (2 * x * slope - order * (order + 1) * value) / (1 - x * x); // P''_n
+      const double slope = order * (before - x * value) / (1 - x * x);                       // P'_n
+      const double curvature = (2 * x * slope - order * (order + 1) * value) / (1 - x * x);  // P''_n
       x -= slope / curvature;
     }
     if (2 * i == order) x = 0;

@@ -14,14 +14,16 @@ namespace {
 
 /// Names of references as `plain` returns them, in order of preference.
 constexpr std::string_view kReferenceNames[] = {
-    "reference",  "ref",        "meditref",   "material",  "materialid", "mat",      "matid",      "attribute",
-    "gmshphysical", "physical", "cellentityid", "region",  "regionid",   "subdomain", "subdomainid", "domain",
-    "domainid",   "zone",       "zoneid",     "block",     "blockid",    "elementblockid", "part",  "partid",
-    "component",  "componentid", "label",     "tag",       "celltag",    "marker",   "gmshgeometrical"};
+    "reference",      "ref",          "meditref",       "material",     "materialid",  "mat",      "matid",
+    "attribute",      "gmshphysical", "physical",       "cellentityid", "region",      "regionid", "subdomain",
+    "subdomainid",    "domain",       "domainid",       "zone",         "zoneid",      "block",    "blockid",
+    "elementblockid", "part",         "partid",         "component",    "componentid", "label",    "tag",
+    "celltag",        "marker",       "gmshgeometrical"};
 
 /// Names, as `plain` returns them, of arrays that only number cells or processes.
-constexpr std::string_view kIdNames[] = {"id", "cellid", "elementid", "elemid", "cellnumber", "elementnumber", "index",
-                                         "cellindex", "processid", "vtkprocessid", "processorid", "rank", "procid"};
+constexpr std::string_view kIdNames[] = {
+    "id",        "cellid",    "elementid",    "elemid",      "cellnumber", "elementnumber", "index",
+    "cellindex", "processid", "vtkprocessid", "processorid", "rank",       "procid"};
 
 /// Returns a name's letters, in lower case, and digits, without a plural's s.
 std::string plain(std::string_view name) {
@@ -36,8 +38,8 @@ bool is_id_or_ghost(std::string_view name) {
   const std::string text = plain(name);
   const bool is_id = text.ends_with("id") || text.ends_with("number") || text.ends_with("index");
   return text.find("ghost") != std::string::npos ||
-         (is_id && (text.starts_with("global") || text.starts_with("pedigree") ||
-                    text.find("original") != std::string::npos)) ||
+         (is_id &&
+          (text.starts_with("global") || text.starts_with("pedigree") || text.find("original") != std::string::npos)) ||
          std::find(std::begin(kIdNames), std::end(kIdNames), text) != std::end(kIdNames);
 }
 

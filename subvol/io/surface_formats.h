@@ -23,7 +23,7 @@ ParsedSurface parse_obj(const std::string& name, std::string_view bytes);
 ParsedSurface parse_stl(const std::string& name, std::string_view bytes);
 ParsedSurface parse_ply(const std::string& name, std::string_view bytes);
 ParsedSurface parse_3mf(const std::string& name, std::string_view bytes);
-ParsedSurface parse_gltf(const std::string& name, std::string_view bytes);  ///< name: also where its buffers are
+ParsedSurface parse_gltf(const std::string& name, std::string_view bytes);   ///< name: also where its buffers are
 ParsedSurface parse_scene(const std::string& name, std::string_view bytes);  ///< .fbx and .dae, by Assimp
 ParsedSurface parse_vtp(const std::string& name, std::string_view bytes);
 /// Returns the values of a vertex property, one per vertex. InputError: there is no such property.

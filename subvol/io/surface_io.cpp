@@ -36,8 +36,8 @@ struct Parser {
   ParsedSurface (*parse)(const std::string& name, std::string_view bytes);
 };
 /// By the extensions of `file_formats()` of surfaces that are read.
-constexpr Parser kParsers[] = {{".off", parse_off}, {".obj", parse_obj}, {".stl", parse_stl}, {".ply", parse_ply},
-                               {".vtp", parse_vtp}, {".3mf", parse_3mf}, {".glb", parse_gltf}, {".gltf", parse_gltf},
+constexpr Parser kParsers[] = {{".off", parse_off},   {".obj", parse_obj},  {".stl", parse_stl},  {".ply", parse_ply},
+                               {".vtp", parse_vtp},   {".3mf", parse_3mf},  {".glb", parse_gltf}, {".gltf", parse_gltf},
                                {".fbx", parse_scene}, {".dae", parse_scene}};
 
 /// Warnings and errors about one file.
@@ -254,8 +254,8 @@ std::string why_no_faces(const ParsedSurface& parsed) {
 
 PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* warnings) {
   const std::string extension = lower_case(path.extension().string());
-  const auto* parser = std::find_if(std::begin(kParsers), std::end(kParsers),
-                                    [&](const Parser& p) { return extension == p.extension; });
+  const auto* parser =
+      std::find_if(std::begin(kParsers), std::end(kParsers), [&](const Parser& p) { return extension == p.extension; });
   if (parser == std::end(kParsers))
     throw InputError(path.string() + ": " + unknown_extension(path) + "; expected a surface: " + surface_formats());
   Remarks remarks(path.string(), warnings);
@@ -313,8 +313,7 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
   return sound_triangles(read_polygon_mesh(path, warnings), path.string(), warnings);
 }
 
-TriangleMesh sound_triangles(const PolygonMesh& polygons, const std::string& name,
-                             std::vector<std::string>* warnings) {
+TriangleMesh sound_triangles(const PolygonMesh& polygons, const std::string& name, std::vector<std::string>* warnings) {
   Remarks remarks(name, warnings);
   TriangleMesh mesh = triangulate(polygons);
   const std::size_t num_flat =
@@ -354,7 +353,8 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
   return sound_points(std::move(cloud.points), path.string(), warnings);
 }
 
-PointCloud internal::sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings) {
+PointCloud internal::sound_points(std::vector<Vec3> points, const std::string& name,
+                                  std::vector<std::string>* warnings) {
   Remarks remarks(name, warnings);
   if (points.empty()) remarks.fail("no points");
   check_extent(points, remarks);

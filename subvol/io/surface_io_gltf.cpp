@@ -8,8 +8,8 @@
 #include "subvol/io/surface_formats.h"
 #include "subvol/io/triangle_welder.h"
 
-#include <Eigen/Geometry>
 #include <tiny_gltf.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cstring>
@@ -250,9 +250,12 @@ class GltfParser {
       return;
     }
     for (std::size_t k = 2; k < corners.size(); ++k) {
-      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) add(corners[0], corners[k - 1], corners[k]);
-      else if (k % 2 == 0) add(corners[k - 2], corners[k - 1], corners[k]);
-      else add(corners[k - 1], corners[k - 2], corners[k]);
+      if (mode == TINYGLTF_MODE_TRIANGLE_FAN)
+        add(corners[0], corners[k - 1], corners[k]);
+      else if (k % 2 == 0)
+        add(corners[k - 2], corners[k - 1], corners[k]);
+      else
+        add(corners[k - 1], corners[k - 2], corners[k]);
     }
   }
 

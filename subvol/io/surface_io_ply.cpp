@@ -29,10 +29,10 @@ struct NamedType {
   ValueType type;
 };
 constexpr NamedType kPlyTypes[] = {
-    {"char", kInt8},     {"uchar", kUInt8},   {"short", kInt16},    {"ushort", kUInt16}, {"int", kInt32},
-    {"uint", kUInt32},   {"float", kFloat32}, {"double", kFloat64}, {"int8", kInt8},     {"uint8", kUInt8},
-    {"int16", kInt16},   {"uint16", kUInt16}, {"int32", kInt32},    {"uint32", kUInt32}, {"float32", kFloat32},
-    {"float64", kFloat64}};
+    {"char", kInt8},   {"uchar", kUInt8},   {"short", kInt16},     {"ushort", kUInt16},
+    {"int", kInt32},   {"uint", kUInt32},   {"float", kFloat32},   {"double", kFloat64},
+    {"int8", kInt8},   {"uint8", kUInt8},   {"int16", kInt16},     {"uint16", kUInt16},
+    {"int32", kInt32}, {"uint32", kUInt32}, {"float32", kFloat32}, {"float64", kFloat64}};
 
 struct Property {
   enum class Use { none, x, y, z, corners, strip, attribute, label, red, green, blue };
@@ -122,9 +122,12 @@ class PlyParser {
         choose_face_properties();
         return;
       }
-      if (keyword == "format") has_format = true, read_format(words);
-      else if (keyword == "element") read_element_line(words);
-      else if (keyword == "property") read_property_line(words);
+      if (keyword == "format")
+        has_format = true, read_format(words);
+      else if (keyword == "element")
+        read_element_line(words);
+      else if (keyword == "property")
+        read_property_line(words);
       else if (keyword != "comment" && keyword != "obj_info")
         scan_.fail("unknown header keyword " + in_quotes(keyword));
     }
@@ -369,8 +372,10 @@ class PlyParser {
   }
 
   void skip_value(ValueType type) {
-    if (text_) scan_.word("a value");
-    else read_binary(type);
+    if (text_)
+      scan_.word("a value");
+    else
+      read_binary(type);
   }
 
   double read_binary(ValueType type) {

@@ -14,8 +14,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kHeaderBytes = 84;    // 80 arbitrary bytes, then the number of facets
-constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, number of attribute bytes that follow (two bytes)
+constexpr std::size_t kHeaderBytes = 84;  // 80 arbitrary bytes, then the number of facets
+constexpr std::size_t kFacetBytes = 50;   // normal, three vertices, number of attribute bytes that follow (two bytes)
 constexpr std::size_t kFirstVertexByte = 12;
 constexpr std::size_t kAttributeCountByte = 48;
 
@@ -50,8 +50,7 @@ std::optional<BinaryFacets> facets_with_attributes(std::string_view bytes) {
   for (std::size_t f = 0, n = num_binary_facets(bytes); f < n; ++f) {
     if (facets.end > bytes.size() || bytes.size() - facets.end < kFacetBytes) return std::nullopt;
     facets.begins.push_back(facets.end);
-    const double more =
-        decode(bytes.data() + facets.end + kAttributeCountByte, kUInt16, std::endian::little);
+    const double more = decode(bytes.data() + facets.end + kAttributeCountByte, kUInt16, std::endian::little);
     facets.end += kFacetBytes + static_cast<std::size_t>(more);
   }
   if (facets.end > bytes.size()) return std::nullopt;
@@ -158,8 +157,7 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
 ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
   ParsedSurface parsed;
   if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
-  parsed.mesh =
-      is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes);
+  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes);
   return parsed;
 }
 

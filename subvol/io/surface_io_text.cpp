@@ -108,8 +108,8 @@ constexpr std::string_view kFreeFormObj[] = {"cstype", "deg",  "bmat", "step", "
 /// The keywords of OBJ that name what the faces after them belong to, in order of preference.
 struct ObjNaming {
   std::string_view keyword;
-  const char* missed;          ///< what they are, for warnings
-  std::size_t least_names;     ///< fewest names on faces for which they become groups
+  const char* missed;       ///< what they are, for warnings
+  std::size_t least_names;  ///< fewest names on faces for which they become groups
 };
 /// A lone object is the whole file; its name tells nothing apart.
 constexpr std::array<ObjNaming, 3> kObjNamings{
@@ -224,7 +224,8 @@ class ObjParser {
       const std::int64_t v = *number < 0 ? so_far + *number : *number - 1;
       if (*number == 0 || v < 0 || v >= std::numeric_limits<Index>::max())
         scan_.fail("vertex number " + std::to_string(*number) + " with " + std::to_string(so_far) +
-                       " vertices so far; numbers start at 1, negative ones count back", line_);
+                       " vertices so far; numbers start at 1, negative ones count back",
+                   line_);
       mesh_.face_vertices.push_back(static_cast<Index>(v));
     }
     mesh_.face_offsets.push_back(mesh_.face_vertices.size());
@@ -238,7 +239,8 @@ class ObjParser {
       for (std::size_t i = mesh_.face_offsets[f]; i < mesh_.face_offsets[f + 1]; ++i)
         if (static_cast<std::size_t>(mesh_.face_vertices[i]) >= mesh_.positions.size())
           scan_.fail("vertex number " + std::to_string(std::int64_t{mesh_.face_vertices[i]} + 1) + " of " +
-                         std::to_string(mesh_.positions.size()) + " vertices", face_lines_[f]);
+                         std::to_string(mesh_.positions.size()) + " vertices",
+                     face_lines_[f]);
   }
 
   std::string name_;

@@ -142,8 +142,10 @@ class VtpParser {
     TextScanner codes("group_names", names.child_value());
     while (codes.peek()) {
       const std::int64_t code = codes.integer("a character");
-      if (code == 0) texts.emplace_back();
-      else texts.back() += static_cast<char>(code);
+      if (code == 0)
+        texts.emplace_back();
+      else
+        texts.back() += static_cast<char>(code);
     }
     for (std::size_t i = 0; i < known.size() && i < texts.size(); ++i)
       for (Group& group : groups)
@@ -154,8 +156,8 @@ class VtpParser {
   VtkXmlFile file_;
   PolygonMesh mesh_;
   LeftOut left_out_;
-  std::vector<std::size_t> cells_;       ///< of the faces of the piece
-  std::optional<std::string> chosen_;    ///< name of the array of labels
+  std::vector<std::size_t> cells_;     ///< of the faces of the piece
+  std::optional<std::string> chosen_;  ///< name of the array of labels
   std::vector<int> labels_;
 };
 

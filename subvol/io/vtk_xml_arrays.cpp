@@ -23,8 +23,8 @@ struct XmlType {
   ValueType type;
 };
 constexpr XmlType kXmlTypes[] = {
-    {"Int8", kInt8},     {"UInt8", kUInt8},   {"Int16", kInt16}, {"UInt16", kUInt16},   {"Int32", kInt32},
-    {"UInt32", kUInt32}, {"Int64", kInt64},   {"UInt64", kUInt64}, {"Float32", kFloat32}, {"Float64", kFloat64},
+    {"Int8", kInt8},     {"UInt8", kUInt8}, {"Int16", kInt16},   {"UInt16", kUInt16},   {"Int32", kInt32},
+    {"UInt32", kUInt32}, {"Int64", kInt64}, {"UInt64", kUInt64}, {"Float32", kFloat32}, {"Float64", kFloat64},
 };
 
 /// Largest ratios of decompression: each compressed byte holds at most so many.
@@ -88,8 +88,8 @@ std::string decompressed(const VtkXmlArray& array, const std::string& compressor
 #ifdef SUBVOL_LZ4
   constexpr std::uint64_t kMostLz4 = std::numeric_limits<int>::max();
   if (size > kMostLz4 || block.size() > kMostLz4) fail(array, "a block is too large for LZ4");
-  const int length = LZ4_decompress_safe(block.data(), bytes.data(), static_cast<int>(block.size()),
-                                         static_cast<int>(size));
+  const int length =
+      LZ4_decompress_safe(block.data(), bytes.data(), static_cast<int>(block.size()), static_cast<int>(size));
   if (length < 0 || static_cast<std::uint64_t>(length) != size) fail(array, "the data are not LZ4's, or damaged");
 #endif
   return bytes;
@@ -165,8 +165,8 @@ std::vector<double> numbers_of_text(const VtkXmlArray& array) {
 }  // namespace
 
 std::vector<double> decode_vtk_xml_array(const VtkXmlArray& array, const VtkXmlStorage& storage) {
-  const auto type = std::find_if(std::begin(kXmlTypes), std::end(kXmlTypes),
-                                 [&](const XmlType& t) { return array.type == t.name; });
+  const auto type =
+      std::find_if(std::begin(kXmlTypes), std::end(kXmlTypes), [&](const XmlType& t) { return array.type == t.name; });
   if (type == std::end(kXmlTypes)) fail(array, "unknown type " + in_quotes(array.type));
   if (array.format == "ascii" || array.format.empty()) return numbers_of_text(array);
   std::string digits, bytes;

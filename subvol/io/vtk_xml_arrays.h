@@ -13,17 +13,17 @@ namespace subvol::internal {
 /// How the arrays of a VTK XML file are stored.
 struct VtkXmlStorage {
   std::endian endian = std::endian::little;
-  ValueType header = kUInt32;             ///< type of the lengths before binary data
-  std::string compressor;                 ///< vtkZLibDataCompressor, vtkLZ4DataCompressor, or empty
-  std::string_view appended;              ///< what follows the underscore of AppendedData; base64 if `appended_base64`
+  ValueType header = kUInt32;  ///< type of the lengths before binary data
+  std::string compressor;      ///< vtkZLibDataCompressor, vtkLZ4DataCompressor, or empty
+  std::string_view appended;   ///< what follows the underscore of AppendedData; base64 if `appended_base64`
   bool appended_base64 = false;
 };
 
 /// One data array before it is decoded.
 struct VtkXmlArray {
   std::string name, type, format;
-  std::string_view text;                  ///< content of the element
-  std::string offset;                     ///< attribute of an array of the appended data
+  std::string_view text;  ///< content of the element
+  std::string offset;     ///< attribute of an array of the appended data
 };
 
 /// Decodes a data array: numbers in text, base64 or raw, compressed or not.

@@ -30,8 +30,8 @@ VtkXmlFile::VtkXmlFile(const std::string& name, std::string_view bytes, const ch
   const pugi::xml_parse_result result =
       document_->load_buffer_inplace(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result) {
-    const auto line = std::count(bytes.begin(), bytes.begin() + std::min<std::ptrdiff_t>(result.offset, text_.size()),
-                                 '\n') + 1;
+    const auto line =
+        std::count(bytes.begin(), bytes.begin() + std::min<std::ptrdiff_t>(result.offset, text_.size()), '\n') + 1;
     throw InputError(name_ + ":" + std::to_string(line) + ": not whole XML: " + result.description());
   }
   const pugi::xml_node file = document_->child("VTKFile");
@@ -42,10 +42,14 @@ VtkXmlFile::VtkXmlFile(const std::string& name, std::string_view bytes, const ch
   const auto version = parse_number(file.attribute("version").as_string("0.1"));
   if (!version || *version < 0 || *version > 2.2) fail("expected version 0.1 to 2.2 of VTK XML");
   old_numbers_ = *version < 2.1;
-  if (order == "BigEndian") storage_.endian = std::endian::big;
-  else if (!order.empty() && order != "LittleEndian") fail("unknown byte_order " + in_quotes(order));
-  if (header == "UInt64") storage_.header = kUInt64;
-  else if (!header.empty() && header != "UInt32") fail("unknown header_type " + in_quotes(header));
+  if (order == "BigEndian")
+    storage_.endian = std::endian::big;
+  else if (!order.empty() && order != "LittleEndian")
+    fail("unknown byte_order " + in_quotes(order));
+  if (header == "UInt64")
+    storage_.header = kUInt64;
+  else if (!header.empty() && header != "UInt32")
+    fail("unknown header_type " + in_quotes(header));
   storage_.compressor = file.attribute("compressor").value();
   if (!grid()) fail("expected the element " + type_);
 }

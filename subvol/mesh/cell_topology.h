@@ -35,9 +35,9 @@ inline constexpr int kMaxCellFaces = 6;
 struct CellTopology {
   const char* name;
   int num_vertices, num_edges, num_faces;
-  std::array<std::array<std::int8_t, 2>, kMaxCellEdges> edges;     ///< end vertices of each edge
-  std::array<std::int8_t, kMaxCellFaces> face_sizes;               ///< 3 or 4
-  std::array<std::array<std::int8_t, 4>, kMaxCellFaces> faces;     ///< corners of each face, outward
+  std::array<std::array<std::int8_t, 2>, kMaxCellEdges> edges;  ///< end vertices of each edge
+  std::array<std::int8_t, kMaxCellFaces> face_sizes;            ///< 3 or 4
+  std::array<std::array<std::int8_t, 4>, kMaxCellFaces> faces;  ///< corners of each face, outward
   int num_trivalent;  ///< corners at which three edges meet: all, or the first four of a pyramid
   /// The three neighbors of each of these, ordered so that det[n0-c, n1-c, n2-c] > 0 in a cell of positive volume.
   std::array<std::array<std::int8_t, 3>, kMaxCellVertices> corner_neighbors;

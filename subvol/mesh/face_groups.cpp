@@ -16,8 +16,11 @@ namespace {
 std::size_t utf8_size(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
-  const std::size_t size = first < 0x80 ? 1 : first >= 0xC2 && first < 0xE0 ? 2 : (first & 0xF0) == 0xE0 ? 3
-                           : first >= 0xF0 && first < 0xF5 ? 4 : 0;
+  const std::size_t size = first < 0x80                    ? 1
+                           : first >= 0xC2 && first < 0xE0 ? 2
+                           : (first & 0xF0) == 0xE0        ? 3
+                           : first >= 0xF0 && first < 0xF5 ? 4
+                                                           : 0;
   if (size == 0 || size > text.size()) return 0;
   for (std::size_t i = 1; i < size; ++i)
     if ((byte(i) & 0xC0) != 0x80) return 0;
@@ -99,8 +102,8 @@ VolumeFaceGroups renumbered(const VolumeFaceGroups& groups, std::span<const Inde
     bool kept = true;
     for (std::size_t i = 0; i < size; ++i) {
       corners[i] = number[entry.face[i]];
-      kept = kept && corners[i] != kNoIndex && std::find(corners.begin(), corners.begin() + i, corners[i]) ==
-                                                   corners.begin() + i;
+      kept = kept && corners[i] != kNoIndex &&
+             std::find(corners.begin(), corners.begin() + i, corners[i]) == corners.begin() + i;
     }
     if (kept) result.faces.push_back({face_key({corners.data(), size}), entry.group});
   }

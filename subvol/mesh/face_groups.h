@@ -29,8 +29,8 @@ void make_names_utf8(std::vector<Group>& groups);
 
 /// The groups of a surface's faces. A face is in one group or in none. Without groups, both lists are empty.
 struct FaceGroups {
-  std::vector<Group> groups;    ///< no two have the same number
-  std::vector<Index> of_face;   ///< one entry per triangle or polygon: a place in `groups`, or kNoIndex
+  std::vector<Group> groups;   ///< no two have the same number
+  std::vector<Index> of_face;  ///< one entry per triangle or polygon: a place in `groups`, or kNoIndex
   bool empty() const { return groups.empty(); }
   friend bool operator==(const FaceGroups&, const FaceGroups&) = default;
 };
@@ -53,8 +53,8 @@ struct GroupedFace {
 /// Faces are named by their vertices, as tags are, so that cells may be renumbered, turned and dropped. A face may be
 /// in several groups. A face that the mesh does not have is no error: writers leave it out.
 struct VolumeFaceGroups {
-  std::vector<Group> groups;         ///< no two have the same number
-  std::vector<GroupedFace> faces;    ///< ascending, none twice
+  std::vector<Group> groups;       ///< no two have the same number
+  std::vector<GroupedFace> faces;  ///< ascending, none twice
   bool empty() const { return groups.empty(); }
   friend bool operator==(const VolumeFaceGroups&, const VolumeFaceGroups&) = default;
 };

@@ -88,9 +88,8 @@ std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const MeshTopology&
 /// Sorts tags by key and keeps the sharpest of those with equal keys.
 template <class Tag, class Key>
 void unify(std::vector<Tag>& tags, const Key& key) {
-  std::sort(tags.begin(), tags.end(), [&](const Tag& a, const Tag& b) {
-    return key(a) != key(b) ? key(a) < key(b) : a.sharpness > b.sharpness;
-  });
+  std::sort(tags.begin(), tags.end(),
+            [&](const Tag& a, const Tag& b) { return key(a) != key(b) ? key(a) < key(b) : a.sharpness > b.sharpness; });
   tags.erase(std::unique(tags.begin(), tags.end(), [&](const Tag& a, const Tag& b) { return key(a) == key(b); }),
              tags.end());
 }

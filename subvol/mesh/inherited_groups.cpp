@@ -27,9 +27,8 @@ std::optional<VertexSupport> union_of(std::span<const Index> corners, std::span<
 }
 
 bool holds(const FaceKey& face, const VertexSupport& vertices) {
-  return std::all_of(vertices.begin(), vertices.end(), [&](Index v) {
-    return v == kNoIndex || std::find(face.begin(), face.end(), v) != face.end();
-  });
+  return std::all_of(vertices.begin(), vertices.end(),
+                     [&](Index v) { return v == kNoIndex || std::find(face.begin(), face.end(), v) != face.end(); });
 }
 
 }  // namespace
@@ -63,8 +62,8 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
     const auto corners = refined.face(static_cast<Index>(f));
     const std::optional<VertexSupport> vertices = union_of(corners, support);
     if (!vertices) continue;
-    const auto first = std::lower_bound(smallest_around.begin(), smallest_around.end(),
-                                        std::pair(vertices->front(), kNoIndex));
+    const auto first =
+        std::lower_bound(smallest_around.begin(), smallest_around.end(), std::pair(vertices->front(), kNoIndex));
     for (auto at = first; at != smallest_around.end() && at->first == vertices->front(); ++at)
       add(corners, *vertices, at->second);
   }

@@ -13,19 +13,19 @@ namespace subvol {
 struct MeshDefect {
   enum class Kind {
     no_cells,
-    size_mismatch,            ///< arrays of inconsistent length, or a cell of unknown kind
+    size_mismatch,  ///< arrays of inconsistent length, or a cell of unknown kind
     index_out_of_range,
-    not_finite,               ///< a position with a coordinate that is NaN or infinite
-    repeated_vertex,          ///< a cell that names one vertex twice
+    not_finite,       ///< a position with a coordinate that is NaN or infinite
+    repeated_vertex,  ///< a cell that names one vertex twice
     duplicate_cell,
-    face_of_many_cells,       ///< a face of three or more cells
-    nonconforming_face,       ///< a quad against triangles, a hanging vertex on an edge, or corners in different orders
-    nonmanifold_edge,         ///< a boundary edge that does not have exactly two boundary faces
-    nonmanifold_vertex,       ///< a boundary vertex whose boundary faces form more than one fan
-    inconsistent_orientation, ///< two cells that see their common face from the same side
-    inverted_cell,            ///< a cell whose Jacobian determinant is <= 0 at a corner
-    bad_tag,                  ///< a tag off all sheets, out of order or repeated, or with sharpness <= 0 or NaN
-    unused_vertex             ///< a vertex that no cell names
+    face_of_many_cells,  ///< a face of three or more cells
+    nonconforming_face,  ///< a quad against triangles, a hanging vertex on an edge, or corners in different orders
+    nonmanifold_edge,    ///< a boundary edge that does not have exactly two boundary faces
+    nonmanifold_vertex,  ///< a boundary vertex whose boundary faces form more than one fan
+    inconsistent_orientation,  ///< two cells that see their common face from the same side
+    inverted_cell,             ///< a cell whose Jacobian determinant is <= 0 at a corner
+    bad_tag,                   ///< a tag off all sheets, out of order or repeated, or with sharpness <= 0 or NaN
+    unused_vertex              ///< a vertex that no cell names
   };
   Kind kind;
   Index entity;         ///< number of the first vertex or cell concerned, or kNoIndex

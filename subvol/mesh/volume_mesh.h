@@ -18,13 +18,13 @@ namespace subvol {
 /// The corners of a cell follow `CellKind`'s numbering. Anything may be stored; `validate` says what is wrong with it.
 struct VolumeMesh {
   std::vector<Vec3> positions;
-  std::vector<CellKind> kinds;             ///< one per cell
-  std::vector<std::size_t> cell_offsets{0};///< num_cells() + 1 entries into cell_vertices
+  std::vector<CellKind> kinds;               ///< one per cell
+  std::vector<std::size_t> cell_offsets{0};  ///< num_cells() + 1 entries into cell_vertices
   std::vector<Index> cell_vertices;
-  std::vector<int> references;             ///< one group number per cell, or empty (all 0)
+  std::vector<int> references;  ///< one group number per cell, or empty (all 0)
   FeatureTags tags;
-  VolumeFaceGroups face_groups;            ///< named faces; empty: none
-  std::vector<Group> regions;              ///< names of references, where there are any; dimension 3
+  VolumeFaceGroups face_groups;  ///< named faces; empty: none
+  std::vector<Group> regions;    ///< names of references, where there are any; dimension 3
 
   std::size_t num_vertices() const { return positions.size(); }
   std::size_t num_cells() const { return kinds.size(); }

@@ -174,9 +174,8 @@ SubdivisionAudit audit(const VolumeMesh& mesh) {
 FeatureTags unfolding_tags(const VolumeMesh& mesh, const SubdivisionAudit& found, double sharpness) {
   FeatureTags tags = mesh.tags;
   for (const auto& [v0, v1] : found.folding_edges) tags.creases.push_back({v0, v1, sharpness});
-  std::sort(tags.creases.begin(), tags.creases.end(), [](const CreaseEdge& a, const CreaseEdge& b) {
-    return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1);
-  });
+  std::sort(tags.creases.begin(), tags.creases.end(),
+            [](const CreaseEdge& a, const CreaseEdge& b) { return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1); });
   return tags;
 }
 

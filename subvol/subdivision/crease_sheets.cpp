@@ -23,8 +23,7 @@ CreaseSheets::CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology,
   edge_shares_.assign(topology.num_edges(), 0.0);
   fixed_.assign(mesh.num_vertices(), 0);
   for (std::size_t v = 0; v < surface.num_vertices(); ++v)
-    fixed_[sheets.vertices[v]] =
-        vertex_weights_at(surface, static_cast<Index>(v), BoundaryRule::catmull_clark).fixed();
+    fixed_[sheets.vertices[v]] = vertex_weights_at(surface, static_cast<Index>(v), BoundaryRule::catmull_clark).fixed();
 
   on_sheet_.assign(topology.num_edges(), 0);
   for (const Index e : sheets.edges) on_sheet_[e] = 1;

@@ -28,7 +28,9 @@ struct Spoke {
 /// Returns the spokes of a vertex, counter-clockwise.
 std::vector<Spoke> spokes_of(const SurfaceTopology& surface, Index v) {
   std::vector<Spoke> spokes;
-  visit_ring(surface, v, [&](int, Index edge, Index neighbor, Index face) { spokes.push_back({edge, neighbor, face}); });
+  visit_ring(surface, v, [&](int, Index edge, Index neighbor, Index face) {
+    spokes.push_back({edge, neighbor, face});
+  });
   return spokes;
 }
 
@@ -39,9 +41,8 @@ RingSharpness ring_sharpness(const SurfaceTopology& surface, Index v, std::span<
 }
 
 bool all_quads(const SurfaceTopology& surface, std::span<const Spoke> spokes) {
-  return std::all_of(spokes.begin(), spokes.end(), [&](const Spoke& spoke) {
-    return spoke.face == kNoIndex || surface.face_size(spoke.face) == 4;
-  });
+  return std::all_of(spokes.begin(), spokes.end(),
+                     [&](const Spoke& spoke) { return spoke.face == kNoIndex || surface.face_size(spoke.face) == 4; });
 }
 
 /// Turns ring masks of a vertex into rows: directly if all its faces are quads, otherwise through its children, whose
@@ -148,8 +149,8 @@ Tangents tangent_rows(const SurfaceTopology& surface, std::span<const Index> col
       for (int i = 0; i < sector.count; ++i) {
         const Index f = ring.spokes()[(sector.first + i) % ring.spokes().size()].face;
         const auto face = surface.face(f);
-        tangents.corner_sites[surface.face_offsets[f] + (std::find(face.begin(), face.end(), static_cast<Index>(v)) - face.begin())] =
-            site;
+        tangents.corner_sites[surface.face_offsets[f] +
+                              (std::find(face.begin(), face.end(), static_cast<Index>(v)) - face.begin())] = site;
       }
       const std::array<RingMask, 2> masks = tangent_masks(ring.sharpness(), sector);
       ring.add(masks[0], row);

@@ -31,7 +31,7 @@ struct BoundaryRefinement {
   /// The faces of the mesh that were refined, as MeshTopology numbers them: its boundary_faces(), and then those
   /// of interfaces, if they were refined, too.
   std::vector<Index> faces;
-  std::vector<Index> vertices;      ///< volume vertex of each of the first vertices.size() refined vertices
+  std::vector<Index> vertices;  ///< volume vertex of each of the first vertices.size() refined vertices
   /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each. Those on interfaces are left
   /// out if only the boundary is refined.
   std::vector<std::array<Index, 2>> crease_edges;

@@ -112,8 +112,7 @@ std::size_t LimitSurface::num_faces() const { return implementation_->patches.si
 LimitPoint LimitSurface::evaluate(Index face, double u, double v) const {
   if (face < 0 || static_cast<std::size_t>(face) >= num_faces())
     throw InputError("LimitSurface::evaluate: face " + std::to_string(face) + " of " + std::to_string(num_faces()));
-  if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1))
-    throw InputError("LimitSurface::evaluate: u and v must lie in [0, 1]");
+  if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1)) throw InputError("LimitSurface::evaluate: u and v must lie in [0, 1]");
   const Implementation::Patch& patch = implementation_->patch(face);
   const double uv[2] = {u, v};
   LimitPoint point;

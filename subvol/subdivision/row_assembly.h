@@ -133,8 +133,7 @@ SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill)
       for (std::size_t c = 0; c < kWaveChunks; ++c)
         errors.guard([&] { fill_chunk(chunks[c], wave + c * kChunkRows, *row); });
 #pragma omp single
-      for (std::size_t c = 0; c < kWaveChunks; ++c)
-        errors.guard([&] { join(chunks[c], wave + c * kChunkRows); });
+      for (std::size_t c = 0; c < kWaveChunks; ++c) errors.guard([&] { join(chunks[c], wave + c * kChunkRows); });
     }
   }
   errors.rethrow();

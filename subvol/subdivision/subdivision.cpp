@@ -57,10 +57,10 @@ std::int8_t find_local_face(const CellTopology& cell, int a, int b, int c) {
 
 ChildHex make_child(const CellTopology& cell, int corner) {
   const auto& n = cell.corner_neighbors[corner];
-  return {{find_local_edge(cell, corner, n[0]), find_local_edge(cell, corner, n[1]),
-           find_local_edge(cell, corner, n[2])},
-          {find_local_face(cell, corner, n[0], n[1]), find_local_face(cell, corner, n[0], n[2]),
-           find_local_face(cell, corner, n[1], n[2])}};
+  return {
+      {find_local_edge(cell, corner, n[0]), find_local_edge(cell, corner, n[1]), find_local_edge(cell, corner, n[2])},
+      {find_local_face(cell, corner, n[0], n[1]), find_local_face(cell, corner, n[0], n[2]),
+       find_local_face(cell, corner, n[1], n[2])}};
 }
 
 /// Returns the centroid of the child hex of a corner: multiples of 1/64 for a hex, of 1/96 for a tet and a prism.
@@ -197,7 +197,8 @@ class Refiner {
     else if (sheet_vertex_[v] != kNoIndex)
       add_vertex_child(sheets_.topology, sheet_vertex_[v], {rule_, sheets_.vertices, row});
     else
-      add_cell_mean(vertex_cells_[v], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.vertices[i]; }, row);
+      add_cell_mean(
+          vertex_cells_[v], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.vertices[i]; }, row);
   }
 
   void edge_row(Index e, RowBuilder& row) const {
@@ -208,16 +209,16 @@ class Refiner {
     const double sheet = crease_sheets_.edge_share(e);
     if (sheet > 0) crease_sheets_.add_edge(e, sheet, row);
     if (sheet < 1)
-      add_cell_mean(edge_cells_[e], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; },
-                    row);
+      add_cell_mean(
+          edge_cells_[e], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; }, row);
   }
 
   void face_row(Index f, RowBuilder& row) const {
     const double sheet = sheet_face_[f] != kNoIndex ? 1 : crease_sheets_.face_share(f);
     if (sheet > 0) add_mean(topology_.face(f), row, sheet);
     if (sheet < 1)
-      add_cell_mean(face_cells_[f], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.faces[i]; },
-                    row);
+      add_cell_mean(
+          face_cells_[f], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.faces[i]; }, row);
   }
 
   const VolumeMesh& mesh_;
@@ -285,9 +286,8 @@ FeatureTags Refiner::fine_tags() const {
     tags.creases.push_back({crease.v0, middle, sharpness});
     tags.creases.push_back({crease.v1, middle, sharpness});
   }
-  std::sort(tags.creases.begin(), tags.creases.end(), [](const CreaseEdge& a, const CreaseEdge& b) {
-    return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1);
-  });
+  std::sort(tags.creases.begin(), tags.creases.end(),
+            [](const CreaseEdge& a, const CreaseEdge& b) { return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1); });
   for (const CornerVertex& corner : mesh_.tags.corners) {
     const double sharpness = child_sharpness(static_cast<float>(corner.sharpness));
     if (sharpness > 0) tags.corners.push_back({corner.vertex, sharpness});

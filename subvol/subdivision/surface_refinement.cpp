@@ -163,8 +163,7 @@ std::vector<Vec3> refined_points(const SurfaceTopology& surface, std::span<const
     for (std::size_t e = 0; e < ne; ++e)
       children[nv + e] = edge_child(surface, static_cast<Index>(e), points, centroids);
 #pragma omp for schedule(static)
-    for (std::size_t v = 0; v < nv; ++v)
-      children[v] = vertex_child(surface, static_cast<Index>(v), points, centroids);
+    for (std::size_t v = 0; v < nv; ++v) children[v] = vertex_child(surface, static_cast<Index>(v), points, centroids);
   }
   return children;
 }
@@ -205,9 +204,9 @@ SurfacePiece surface_piece(const SurfaceTopology& surface, std::span<const Index
       open.corner_vertices.push_back(vertex_number[v]);
       open.corner_edges.push_back(edge_number[e]);
       open.corner_faces.push_back(static_cast<Index>(i));
-      open.twins.push_back(beyond == kNoIndex ? kNoIndex
-                                              : open.face_offsets[beyond] + twin -
-                                                    surface.face_offsets[surface.corner_faces[twin]]);
+      open.twins.push_back(beyond == kNoIndex
+                               ? kNoIndex
+                               : open.face_offsets[beyond] + twin - surface.face_offsets[surface.corner_faces[twin]]);
     }
   return piece;
 }

@@ -68,8 +68,8 @@ std::vector<Vec3> refined_points(const SurfaceTopology& surface, std::span<const
 
 /// Some faces of a surface and all that share a vertex with them, as an open surface with its own numbering.
 struct SurfacePiece {
-  SurfaceTopology topology;      ///< border edges have one corner, whose twin is kNoIndex
-  std::vector<Index> vertices;   ///< vertex of the whole surface for each vertex of the piece
+  SurfaceTopology topology;     ///< border edges have one corner, whose twin is kNoIndex
+  std::vector<Index> vertices;  ///< vertex of the whole surface for each vertex of the piece
 };
 
 /// Cuts chosen faces and all that share a vertex with them out of a surface.

@@ -10,8 +10,7 @@
 
 namespace subvol::internal {
 
-FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface,
-                           std::span<const Index> vertex_numbers) {
+FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface, std::span<const Index> vertex_numbers) {
   std::map<std::pair<Index, Index>, double> creases;
   for (const CreaseEdge& crease : tags.creases) creases[std::minmax(crease.v0, crease.v1)] = crease.sharpness;
   std::map<Index, double> corners;

@@ -76,8 +76,8 @@ class BoxTree {
   std::vector<Eigen::AlignedBox3d> hulls_;  ///< bounding box of the branch that begins at each place
 };
 
-constexpr std::size_t kTriangles = 16;   // triangles of a part whose corners and centers are asked for
-constexpr double kClearlyWhole = 0.2;    // farthest from a whole number: ten times the error of two winding numbers
+constexpr std::size_t kTriangles = 16;  // triangles of a part whose corners and centers are asked for
+constexpr double kClearlyWhole = 0.2;   // farthest from a whole number: ten times the error of two winding numbers
 
 /// The triangles of each part.
 struct Parts {

@@ -87,9 +87,9 @@ class RegionFinder {
  private:
   /// A component of space as far as one part of the surface tells.
   struct Cell {
-    Index side;             ///< the least of its sides
+    Index side;  ///< the least of its sides
     std::size_t part = 0;
-    double volume = 0;      ///< signed: negative for the one around the part
+    double volume = 0;  ///< signed: negative for the one around the part
     double area = 0;
     /// Returns true if the cell encloses more than rounding.
     bool has_volume() const {
@@ -102,8 +102,8 @@ class RegionFinder {
     std::vector<std::size_t> cells;  ///< places in cells_of_parts_
     std::size_t outer = 0;           ///< of these, the one around the part
     std::vector<Index> triangles;
-    bool has_curves = false;         ///< edges of more than two triangles
-    double own_volume = 0;           ///< sum over its triangles as they are oriented
+    bool has_curves = false;            ///< edges of more than two triangles
+    double own_volume = 0;              ///< sum over its triangles as they are oriented
     std::optional<std::size_t> inside;  ///< the cell of another part that it lies in
     Eigen::AlignedBox3d box;
   };
@@ -323,8 +323,7 @@ class RegionFinder {
           formatted("%zu closed part%s not face inward though inside another, and bound%s a region; "
                     "--regions merge makes voids of %s",
                     nested_, nested_ == 1 ? " does" : "s do", nested_ == 1 ? "s" : "", nested_ == 1 ? "it" : "them"));
-    if (loose > 0)
-      surface.notes.push_back(formatted("%zu triangles divide nothing and were left out", loose));
+    if (loose > 0) surface.notes.push_back(formatted("%zu triangles divide nothing and were left out", loose));
     return surface;
   }
 
@@ -369,7 +368,7 @@ class RegionFinder {
   std::vector<int> region_of_side_;
   int num_regions_ = 0;
   std::vector<std::string> names_;  ///< of the regions, by number, if these are named solids; else empty
-  std::size_t nested_ = 0;  ///< parts that are regions though they might be voids
+  std::size_t nested_ = 0;          ///< parts that are regions though they might be voids
 };
 
 }  // namespace

@@ -125,8 +125,10 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh) {
       surface.mesh.positions.push_back(sum / static_cast<double>(face.size()));
     }
     for (std::size_t i = 0; i < (face.size() > 3 ? face.size() : 1); ++i) {
-      if (face.size() > 3) surface.mesh.triangles.push_back({center, face[i], face[(i + 1) % face.size()]});
-      else surface.mesh.triangles.push_back({face[0], face[1], face[2]});
+      if (face.size() > 3)
+        surface.mesh.triangles.push_back({center, face[i], face[(i + 1) % face.size()]});
+      else
+        surface.mesh.triangles.push_back({face[0], face[1], face[2]});
       surface.sides.push_back({region_of(first), region_of(second)});
     }
   };

@@ -18,13 +18,13 @@ inline constexpr int kOutsideRegion = 0;
 
 /// A surface that divides space into regions: each triangle knows the region on either side.
 struct RegionSurface {
-  TriangleMesh mesh;                      ///< vertices of equal position are one; each triangle is there once
+  TriangleMesh mesh;  ///< vertices of equal position are one; each triangle is there once
   /// The regions behind each triangle and in front of it, where its normal points: {region, kOutsideRegion} on the
   /// outer surface, the smaller number first on an interface.
   std::vector<std::array<int, 2>> sides;
-  std::vector<Group> regions;             ///< numbers > 0, ascending, and names where there are any; dimension 3
-  std::vector<double> volumes;            ///< of each of `regions`, > 0
-  std::vector<std::string> notes;         ///< a sentence for each choice that could have been another
+  std::vector<Group> regions;      ///< numbers > 0, ascending, and names where there are any; dimension 3
+  std::vector<double> volumes;     ///< of each of `regions`, > 0
+  std::vector<std::string> notes;  ///< a sentence for each choice that could have been another
 
   /// Returns true for triangles between two regions.
   bool is_inner(std::size_t triangle) const { return sides[triangle][1] != kOutsideRegion; }
@@ -39,8 +39,8 @@ enum class RegionRule {
   /// Sheets that divide a solid make regions. So does a closed part inside another, unless it faces inward, as the
   /// wall of a void does.
   automatic,
-  keep,   ///< whatever is enclosed is a region; there are no voids
-  merge   ///< there is one region; sheets inside it do not count, and parts inside others are the walls of voids
+  keep,  ///< whatever is enclosed is a region; there are no voids
+  merge  ///< there is one region; sheets inside it do not count, and parts inside others are the walls of voids
 };
 /// Returns the word for a rule in options and reports: "auto", "keep" or "merge".
 const char* to_string(RegionRule rule);

@@ -111,7 +111,8 @@ class FeatureFinder {
       const bool closed = borders[k][0] == kNoIndex, on_boundary = topology_.is_boundary_vertex(v);
       ++fans[v];
       const bool smooth = closed && ends[v] == 0 && !on_boundary && fans[v] == 1;
-      const bool along_curve = !closed && borders[k][0] != borders[k][1] && ends[v] == 2 && (!on_boundary || rims[v] == 2);
+      const bool along_curve =
+          !closed && borders[k][0] != borders[k][1] && ends[v] == 2 && (!on_boundary || rims[v] == 2);
       if (!smooth && !along_curve) result_.corners[v] = 1;
     }
     for (const CreaseEdge& crease : mesh_.tags.creases) {

@@ -22,13 +22,13 @@ namespace subvol::internal {
 struct SheetFeatures {
   Interfaces interfaces;
   InterfaceMarks marks;
-  std::vector<char> corners;          ///< 1 for these corners, by vertex; empty without interfaces
+  std::vector<char> corners;  ///< 1 for these corners, by vertex; empty without interfaces
   /// The corners of the interface faces, face by face: `fans` joins those of one vertex that are connected across
   /// edges of two faces.
   std::vector<Index> face_offsets{0}, corner_vertices, corner_edges;
-  std::vector<Index> twins;           ///< the corner on the other side of the edge; kNoIndex at feature curves
-  std::vector<Index> fan_of_corner;   ///< numbered by vertex, then by first corner
-  std::vector<Index> fan_vertices;    ///< mesh vertex of each fan
+  std::vector<Index> twins;          ///< the corner on the other side of the edge; kNoIndex at feature curves
+  std::vector<Index> fan_of_corner;  ///< numbered by vertex, then by first corner
+  std::vector<Index> fan_vertices;   ///< mesh vertex of each fan
 
   bool is_curve(Index e) const { return marks.is_curve(e); }
   bool is_corner(Index v) const { return !corners.empty() && corners[v] != 0; }

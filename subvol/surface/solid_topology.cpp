@@ -41,11 +41,14 @@ std::vector<SurfaceEdge> edges_of(const TriangleMesh& mesh, std::span<const Inde
   const auto name = [&](Index v) { return vertex_text(names[v], &mesh.positions[v]); };
   const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh.triangles, mesh.positions.size());
   for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> run) {
-    if (run.size() == 1) edges.push_back({run[0], std::nullopt});
-    else if (run.size() == 2) edges.push_back({run[0], run[1]});
+    if (run.size() == 1)
+      edges.push_back({run[0], std::nullopt});
+    else if (run.size() == 2)
+      edges.push_back({run[0], run[1]});
     else if (pair_around_edge(mesh, run, outward, pairs))
       for (const auto& [i, j] : pairs) edges.push_back({run[i], run[j]});
-    else crowded.add(name(run[0].low), name(run[0].high), run.size());
+    else
+      crowded.add(name(run[0].low), name(run[0].high), run.size());
   });
   if (!crowded.empty()) throw InputError("surface: it bounds no solid unless it is wrapped: " + crowded.text());
   return edges;
@@ -149,8 +152,7 @@ SolidBoundary solid_boundary(const TriangleMesh& surface) {
     result.volume += parts.is_void(c) ? -std::abs(parts.volumes[c]) : std::abs(parts.volumes[c]);
   }
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    if (!parts.faces_out(static_cast<std::size_t>(component[t])))
-      std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
+    if (!parts.faces_out(static_cast<std::size_t>(component[t]))) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   // A surface with a volume below kFlatSolidVolumeShare area^(3/2) is flat up to rounding.
   double area = 0;
   for (const auto& t : mesh.triangles) area += triangle_area(mesh, t);

@@ -24,7 +24,7 @@ std::string to_string(const BettiNumbers& numbers);
 struct SolidBoundary {
   TriangleMesh surface;  ///< closed and oriented outward: every edge runs between two triangles in opposite directions
   BettiNumbers topology;
-  double volume = 0;          ///< > 0
+  double volume = 0;                                                           ///< > 0
   std::size_t flipped_triangles = 0, closed_holes = 0, dropped_triangles = 0;  ///< repairs of the input
 };
 

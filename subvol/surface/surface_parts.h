@@ -12,14 +12,14 @@ namespace subvol::internal {
 /// A welded surface, its edges sorted by how many triangles they have, and the parts that its edges connect.
 struct SurfaceParts {
   WeldedSurface surface;
-  std::vector<SurfaceHalfEdge> sides;  ///< of all triangles, as `sorted_half_edges` returns them
+  std::vector<SurfaceHalfEdge> sides;              ///< of all triangles, as `sorted_half_edges` returns them
   std::vector<std::array<std::size_t, 2>> joined;  ///< positions in `sides`: pairs of sides that connect two triangles
-  std::vector<std::size_t> rims;       ///< positions in `sides`: edges of one triangle
+  std::vector<std::size_t> rims;                   ///< positions in `sides`: edges of one triangle
   /// First position in `sides` of the edges of more than two triangles: those at which solids touch or lie on each
   /// other, whose sides are also in `joined`, and those that connect nothing.
   std::vector<std::size_t> touching, crowded;
-  std::vector<int> part;               ///< of each triangle, numbered by the first triangle
-  std::vector<char> is_closed;         ///< of each part: no rim and no crowded edge
+  std::vector<int> part;        ///< of each triangle, numbered by the first triangle
+  std::vector<char> is_closed;  ///< of each part: no rim and no crowded edge
 
   std::size_t num_parts() const { return is_closed.size(); }
   /// Returns the sides at an edge, given the position of the first.

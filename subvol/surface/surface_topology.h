@@ -47,8 +47,8 @@ struct SurfaceTopology {
 };
 
 enum class SurfaceKind {
-  closed,      ///< every edge has two faces
-  maybe_open   ///< edges of one face are allowed: the border
+  closed,     ///< every edge has two faces
+  maybe_open  ///< edges of one face are allowed: the border
 };
 
 /// Builds a surface from oriented polygons by pairing their corners; all sharpnesses are 0.
@@ -80,6 +80,7 @@ struct SheetFeatures;
 /// features  those of the mesh; if not given, they are found.
 /// Cost: linear. InputError: as `build_surface`; a tag that is on no sheet; sharpness <= 0 or NaN.
 BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology);
-BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology, const internal::SheetFeatures& features);
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology,
+                                const internal::SheetFeatures& features);
 
 }  // namespace subvol

@@ -13,10 +13,10 @@ namespace subvol::internal {
 
 /// A surface whose vertices of equal position are one vertex.
 struct WeldedSurface {
-  TriangleMesh mesh;                  ///< only vertices that a triangle names, in the order in which they are named
-  std::vector<Index> vertex_numbers;  ///< the smallest number that each vertex has in the input
+  TriangleMesh mesh;                    ///< only vertices that a triangle names, in the order in which they are named
+  std::vector<Index> vertex_numbers;    ///< the smallest number that each vertex has in the input
   std::vector<Index> triangle_numbers;  ///< the number of each triangle in the input, ascending
-  std::size_t dropped = 0;            ///< triangles with two corners in one place
+  std::size_t dropped = 0;              ///< triangles with two corners in one place
 };
 
 /// Merges the vertices of equal position and drops the triangles with two corners in one place. Triangles keep their
@@ -42,7 +42,7 @@ std::vector<Index> drop_copies(TriangleMesh& mesh);
 struct SurfaceHalfEdge {
   Index low, high;  ///< its vertices, the smaller number first
   Index triangle;
-  bool forward;     ///< true if the triangle runs from `low` to `high`
+  bool forward;  ///< true if the triangle runs from `low` to `high`
 };
 
 /// Returns the sides of all triangles, those of one edge in succession: sorted by `low`, `high` and `triangle`.

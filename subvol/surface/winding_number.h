@@ -40,12 +40,12 @@ class WindingNumber {
     double at(const Vec3& r) const;
   };
   struct Node {
-    Vec3 center;           ///< center of area
-    double radius = 0;     ///< radius of the ball around the center that contains the triangles
-    Vec3 area_vector;      ///< sum over the triangles
-    Mat3 moment;           ///< sum of (centroid - center) area_vector^T
+    Vec3 center;        ///< center of area
+    double radius = 0;  ///< radius of the ball around the center that contains the triangles
+    Vec3 area_vector;   ///< sum over the triangles
+    Mat3 moment;        ///< sum of (centroid - center) area_vector^T
     SecondMoments second;
-    Index begin = 0, end = 0;      ///< range of the triangles
+    Index begin = 0, end = 0;  ///< range of the triangles
     Index left = kNoIndex, right = kNoIndex;
   };
   Index build(std::vector<Index>& order, Index begin, Index end);

@@ -38,8 +38,8 @@ struct Frame {
 /// Orientation, cell size and offset of a grid.
 struct Placement {
   Frame frame;
-  double size = 0;                   ///< edge length of a cell
-  std::array<bool, 3> half_offset{}; ///< true: the grid is shifted by half a cell along this axis
+  double size = 0;                    ///< edge length of a cell
+  std::array<bool, 3> half_offset{};  ///< true: the grid is shifted by half a cell along this axis
 };
 
 /// Edge lengths to try, relative to the length that follows from the count and the volume.
@@ -125,7 +125,7 @@ class Search {
   const AutoTemplateOptions& options_;
   double cells_;
   std::vector<Frame> frames_;
-  double fraction_ = 0;      ///< progress that was told last
+  double fraction_ = 0;  ///< progress that was told last
   mutable SearchStop stop_;
 };
 

@@ -35,20 +35,20 @@ struct AutoTemplate {
   BettiNumbers topology;        ///< of the mesh, and of the solid that the surface bounds
   std::size_t cells_asked = 0;  ///< the count it was made for: the requested one, or the first larger one that works
   bool pillowed = false;
-  Mat3 axes = Mat3::Identity(); ///< columns: directions of the grid's axes
-  double score = 0;             ///< dissimilarity to the shape, >= 0; comparable between templates of the same count
+  Mat3 axes = Mat3::Identity();  ///< columns: directions of the grid's axes
+  double score = 0;              ///< dissimilarity to the shape, >= 0; comparable between templates of the same count
   /// For each axis the positions x . axis of the grid lines from the first to the last that the cells touch, length,
   /// increasing; empty if the cells are equal cubes.
   std::array<std::vector<double>, 3> lines;
-  VoxelGrid grid;               ///< of which the mesh is a part
-  std::vector<char> kept;       ///< for each cell of the grid, non-zero if the mesh without a pillow has it
-  double aligned_share = 0;     ///< share of the surface's area on planes through `lines`, in [0, 1]
+  VoxelGrid grid;            ///< of which the mesh is a part
+  std::vector<char> kept;    ///< for each cell of the grid, non-zero if the mesh without a pillow has it
+  double aligned_share = 0;  ///< share of the surface's area on planes through `lines`, in [0, 1]
 };
 
 /// The templates that were found, and how many were looked at.
 struct AutoTemplateResult {
-  std::vector<AutoTemplate> templates;  ///< best first, no two from one grid; empty if cancelled or none was found
-  BettiNumbers wanted;                  ///< topology of the surface's solid
+  std::vector<AutoTemplate> templates;    ///< best first, no two from one grid; empty if cancelled or none was found
+  BettiNumbers wanted;                    ///< topology of the surface's solid
   std::size_t grids = 0, candidates = 0;  ///< grids tried; solids found in them with the right topology and count,
                                           ///< possibly several per grid
   bool cancelled = false;

@@ -158,8 +158,8 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   require_valid(mesh, "split");
   const MeshTopology topology(mesh);
   const std::vector<Edge> sheet = sheet_edges(topology, v0, v1);
-  std::map<Index, Index> above;   // upper end of the sheet's edge that starts at each lower end
-  std::map<Index, Index> between; // first new vertex of that edge
+  std::map<Index, Index> above;    // upper end of the sheet's edge that starts at each lower end
+  std::map<Index, Index> between;  // first new vertex of that edge
   VolumeMesh result;
   result.positions = mesh.positions;
   for (const Edge& edge : sheet) {
@@ -228,7 +228,7 @@ VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1) {
 VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2) {
   require_valid(mesh, "collapse");
   const MeshTopology topology(mesh);
-  std::vector<Edge> pairs;         // corners to join in each quad of the column, in the order of `faces`
+  std::vector<Edge> pairs;  // corners to join in each quad of the column, in the order of `faces`
   std::vector<Index> faces;
   std::vector<char> seen(topology.num_faces(), 0);
   const auto add = [&](Index f, const Edge& pair) {

@@ -74,8 +74,8 @@ class LabelSheets {
   const LabelGrid& grid_;
   const LabelSurfaceOptions& options_;
   SearchStop stop_;
-  std::vector<int> values_;              ///< the label of each region
-  std::vector<double> wanted_;           ///< volume of each region
+  std::vector<int> values_;     ///< the label of each region
+  std::vector<double> wanted_;  ///< volume of each region
   std::vector<Face> faces_;
   std::vector<Vec3> start_, positions_;  ///< in voxels, the first one's center being at (0, 0, 0)
   std::vector<std::size_t> offsets_;     ///< where the neighbors of each vertex begin
@@ -169,8 +169,8 @@ VoxelLabels LabelSheets::cleaned() {
     if (label != kOutsideRegion) wanted_[static_cast<std::size_t>(label - 1)] += 1;
   for (std::size_t r = 0; r < values_.size(); ++r)
     if (wanted_[r] == 0)
-      throw InputError("segmentation: label " + std::to_string(values_[r]) +
-                       " has only specks of fewer than " + std::to_string(options_.least_voxels) + " voxels");
+      throw InputError("segmentation: label " + std::to_string(values_[r]) + " has only specks of fewer than " +
+                       std::to_string(options_.least_voxels) + " voxels");
   std::vector<char> changes(labels.num_cells(), 0);
   for (int round = 0; round < kSpeckRepairRounds; ++round) {
     // An edge of four faces may stay. It does no harm.

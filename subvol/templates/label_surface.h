@@ -11,8 +11,8 @@ namespace subvol {
 
 /// Options of `surface_of_labels`.
 struct LabelSurfaceOptions {
-  int rounds = 30;               ///< of smoothing, >= 0; 0: the voxels' own faces
-  std::size_t least_voxels = 20; ///< smaller connected components are given to what is around them
+  int rounds = 30;                ///< of smoothing, >= 0; 0: the voxels' own faces
+  std::size_t least_voxels = 20;  ///< smaller connected components are given to what is around them
   /// Asked about 20 times a second; returns true to cancel. Empty: never.
   std::function<bool()> cancelled;
 };

@@ -26,7 +26,7 @@ using namespace internal;
 
 namespace {
 
-constexpr double kNoPlanes = 0.03; ///< share of the area on planes below which these are no help
+constexpr double kNoPlanes = 0.03;    ///< share of the area on planes below which these are no help
 constexpr double kAllPlanes = 0.999;  ///< share from which on the grid is taken to be exact, and needs no pillows
 
 double area_of(const TriangleMesh& mesh) {
@@ -40,8 +40,8 @@ struct LabeledGrid {
   VoxelGrid grid;
   std::vector<int> labels;
   std::size_t wrong_sheets = 0;
-  double score = 0;     ///< share of the solid's volume in cells of wrong labels
-  double share = 0;     ///< number of cells, as a multiple of the requested one
+  double score = 0;  ///< share of the solid's volume in cells of wrong labels
+  double share = 0;  ///< number of cells, as a multiple of the requested one
   double aligned = 0;
 };
 
@@ -96,8 +96,8 @@ class RegionSearch {
   RegionTopology wanted_;
   int voids_ = 1;
   std::vector<TriangleMesh> boundaries_;
-  std::vector<double> areas_;     ///< of the boundaries of regions
-  double area_ = 0, volume_ = 0;  ///< sums
+  std::vector<double> areas_;        ///< of the boundaries of regions
+  double area_ = 0, volume_ = 0;     ///< sums
   std::vector<std::size_t> misses_;  ///< by region
   std::size_t num_grids_ = 0;        ///< that were labeled
 };
@@ -232,7 +232,7 @@ bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_len
 }
 
 std::optional<LabeledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
-  constexpr int kGrids = 5;  // grids of different sizes at most
+  constexpr int kGrids = 5;                                                 // grids of different sizes at most
   constexpr double kLeastNearCountShare = 0.6, kMostNearCountShare = 1.25;  // of the count asked for
   // A grid without right regions makes the next size finer, one without room for planes coarser.
   constexpr double kFinerSizeFactor = 0.85, kCoarserSizeFactor = 1.25;

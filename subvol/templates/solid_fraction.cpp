@@ -17,7 +17,7 @@ constexpr double kShift = 0.0141421356237;
 struct Crossing {
   Index line;
   double height;  ///< lattice coordinate
-  int winding;  ///< +1: the line enters the solid on its way up
+  int winding;    ///< +1: the line enters the solid on its way up
 };
 
 /// Twice the signed area of (a, b, p) in the plane. Callers pass the end of smaller number as a, so that both triangles
@@ -77,8 +77,7 @@ class LineCrossings {
   };
 
   void add(const std::array<Index, 3>& t) {
-    const Vec3 &a = points_[t[0]], &b = points_[t[1]],
-               &c = points_[t[2]];
+    const Vec3 &a = points_[t[0]], &b = points_[t[1]], &c = points_[t[2]];
     const auto [x0, x1] = axes_[0].range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}));
     if (x0 > x1) return;
     const auto [y0, y1] = axes_[1].range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}));

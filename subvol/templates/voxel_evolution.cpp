@@ -65,8 +65,8 @@ class LoopLengths {
 struct HandleFlip {
   Index cell = kNoIndex;
   double gain = 0;
-  bool through_filled = false;               ///< the loop runs through filled cells (true) or empty ones
-  std::array<std::uint32_t, 2> ends{};       ///< faces at either end of the loop
+  bool through_filled = false;          ///< the loop runs through filled cells (true) or empty ones
+  std::array<std::uint32_t, 2> ends{};  ///< faces at either end of the loop
 };
 
 /// True if flipping a cell changes the number of handles in the wanted direction; then sets the fields of `flip` except
@@ -274,8 +274,7 @@ std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>
   };
   if (start == VoxelStart::cut) {
     fill([&](Index c) { return goal.wants(c); });
-    if (solid.num_filled() == 0 || !make_points_good(solid, goal) || goal.is_stopped() ||
-        !drop_surplus(solid, goal))
+    if (solid.num_filled() == 0 || !make_points_good(solid, goal) || goal.is_stopped() || !drop_surplus(solid, goal))
       return std::nullopt;
   } else {
     if (goal.topology.components != 1 || goal.topology.cavities != 0) return std::nullopt;

@@ -14,7 +14,7 @@ struct VoxelGoal {
   std::span<const double> fractions;  ///< share of each cell that lies in the shape, in [0, 1]
   double threshold = 0.5;             ///< in (0, 1)
   BettiNumbers topology;
-  SearchStop* stop = nullptr;         ///< if it is stopped, the functions below end early; null: they do not
+  SearchStop* stop = nullptr;  ///< if it is stopped, the functions below end early; null: they do not
 
   bool is_stopped() const { return stop && stop->is_stopped(); }
   bool is_stopped_at(std::size_t count) const { return stop && stop->is_stopped_at(count); }

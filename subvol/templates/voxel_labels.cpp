@@ -50,8 +50,7 @@ bool drop_surplus(VoxelLabels& labels, int label, int wanted, bool& changed) {
   for (std::size_t c = 0; c < component.size(); ++c) {
     if (component[c] < 0 || kept[component[c]] || !labels.may_set(static_cast<Index>(c))) continue;
     for (const Index offset : labels.face_offsets())
-      if (const int other = labels.label(static_cast<Index>(c) + offset); other != label)
-        ++votes[component[c]][other];
+      if (const int other = labels.label(static_cast<Index>(c) + offset); other != label) ++votes[component[c]][other];
   }
   for (std::size_t c = 0; c < component.size(); ++c) {
     if (component[c] < 0 || kept[component[c]] || votes[component[c]].empty()) continue;

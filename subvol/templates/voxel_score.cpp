@@ -21,7 +21,8 @@ constexpr double kExtremeWeight = 0.15;
 double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, std::span<const double> volumes,
                    SearchStop* stop) {
   const auto anywhere = [](Index) { return true; };
-  const std::vector<int> cover = voxel_steps(solid, [&](Index c) { return solid.filled(c); }, anywhere, nullptr, stop);
+  const std::vector<int> cover = voxel_steps(
+      solid, [&](Index c) { return solid.filled(c); }, anywhere, nullptr, stop);
   const std::vector<int> stray = voxel_steps(
       solid, [&](Index c) { return fractions[c] > kMostlyInShape; }, anywhere, nullptr, stop);
   double volume = 0, wrong = 0, mean_cover = 0;

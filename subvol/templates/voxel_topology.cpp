@@ -71,8 +71,8 @@ constexpr std::array<int, 256> kEightShares = [] {
 
 /// Faces, edges and vertices of a cell, numbered by the direction from its center: element x+1 + 3(y+1) + 9(z+1).
 struct Elements {
-  std::array<std::uint32_t, kElements> closure{};  ///< elements in the closure of this one
-  std::array<std::uint32_t, kElements> touching{}; ///< elements in its closure, or whose closure contains it
+  std::array<std::uint32_t, kElements> closure{};   ///< elements in the closure of this one
+  std::array<std::uint32_t, kElements> touching{};  ///< elements in its closure, or whose closure contains it
   std::uint32_t all = 0, vertices = 0, edges = 0, faces = 0;
 };
 

@@ -45,14 +45,16 @@ TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][dat
                                           "template merge " + path + " -o out.mesh",
                                           "template collapse " + path + " --vertices 0 1 -o out.mesh",
                                           "optimize " + path + " --order 2 --target target.off -o out.vtk",
-                                          "check " + path, "convert " + path + " -o out.vtk"}
+                                          "check " + path,
+                                          "convert " + path + " -o out.vtk"}
                : std::vector<std::string>{"fit " + path + " --levels 1 --template template.mesh -o out.mesh",
                                           "fit " + path + " --levels 1 -o out.mesh",
                                           "optimize template.mesh --max-iterations 2 --target " + path + " -o out.mesh",
                                           "shell " + path + " --thickness 1% -o out.mesh",
                                           "template auto " + path + " -o out.mesh",
                                           "template extrude " + path + " --thickness 0.1 -o out.mesh",
-                                          "check template.mesh --target " + path, "convert " + path + " -o out.obj"};
+                                          "check template.mesh --target " + path,
+                                          "convert " + path + " -o out.obj"};
     for (const std::string& command : commands) {
       for (const char* output : {"out.mesh", "out.vtk", "out.obj"}) fs::remove(place / output);
       const auto before = place.names();
@@ -74,8 +76,9 @@ TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][dat
 
 TEST_CASE("No verb takes a mesh that is a point", "[cli][slow]") {
   const Workplace place;
-  place.file("point.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
-                           "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
+  place.file("point.mesh",
+             "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
+             "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
   subvol::VolumeMesh straight = subvol::test::lattice(1, 1, 1);
   for (subvol::Vec3& x : straight.positions) x = {1, 2, 3};
   const subvol::HighOrderMesh mesh(subvol::ElementSpace(straight, subvol::Basis::fourier, 2), straight);

@@ -151,8 +151,10 @@ TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
 
 TEST_CASE("subdivide shows the surface of the rule it is given, and tells of the mesh that was read", "[cli]") {
   const Workplace place;
-  REQUIRE(place.run("subdivide template.mesh --boundary averaging --crease-angle 40 -o fine.mesh -o fine.glb --up y "
-                    "--report r.json").status == 0);
+  REQUIRE(place
+              .run("subdivide template.mesh --boundary averaging --crease-angle 40 -o fine.mesh -o fine.glb --up y "
+                   "--report r.json")
+              .status == 0);
   CHECK(place.json("r.json").at("input").at("mesh").at("creases") == 0);
   double highest_point = 0, highest_shown = 0;
   for (const subvol::Vec3& p : subvol::read_volume_mesh(place / "fine.mesh").positions)

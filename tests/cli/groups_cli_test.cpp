@@ -86,8 +86,8 @@ TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimi
   CHECK(groups[1]["faces"].get<int>() > 0);
   CHECK(groups[1]["area"].get<double>() == Approx(groups[1]["target_area"].get<double>()).epsilon(0.2));
 
-  const Run curve = place.run(
-      "fit halves.obj --template template.mesh --order 2 --max-iterations 3 -o c.vtu -o c.msh -o c.obj");
+  const Run curve =
+      place.run("fit halves.obj --template template.mesh --order 2 --max-iterations 3 -o c.vtu -o c.msh -o c.obj");
   INFO(curve.err);
   REQUIRE((curve.status == 0 || curve.status == 4));
   HighOrderFile file = read_high_order(place / "c.vtu");

@@ -135,8 +135,9 @@ TEST_CASE("A checkpoint is an output like others", "[cli][checkpoint]") {
 TEST_CASE("A fit ends before the level that would take more memory than it may", "[cli][memory][slow]") {
   if (memory_cannot_be_limited()) return;
   const Workplace place;
-  const Run run = place.run(kFit + "--levels 6 --max-iterations 3 --memory-limit 200M --chord 1 -o out.mesh "
-                                   "--report r.json");
+  const Run run = place.run(kFit +
+                            "--levels 6 --max-iterations 3 --memory-limit 200M --chord 1 -o out.mesh "
+                            "--report r.json");
   INFO(run.err);
   CHECK(run.status == 4);
   const auto report = place.json("r.json");

@@ -81,11 +81,20 @@ TEST_CASE("What is no report is refused, and nothing is written", "[cli][slow]")
   const Workplace place;
   const std::string head = R"({"subvol": "1", "command": "fit", )";
   const std::string deep = head + "\"stages\": " + std::string(200000, '[') + std::string(200000, ']') + '}';
-  const std::vector<std::string> wrong{
-      "", "{", "[]", "null", "{\"subvol\": 1}", R"({"subvol": "1", "command": 7})", deep, head + R"("stages": [{}]})",
-      head + R"("stages": [{"history": [3]}]})", head + R"("stages": [{"history": [{}], "name": "a"}]})",
-      head + R"("quality": {"cells": "many"}})", head + R"("quality": {"cells": 1, "worst_cells": [{}]}})",
-      head + R"("distance": {"mean_percent": 1}})", head + R"("thickness": {"inside": {"asked": {}}}})"};
+  const std::vector<std::string> wrong{"",
+                                       "{",
+                                       "[]",
+                                       "null",
+                                       "{\"subvol\": 1}",
+                                       R"({"subvol": "1", "command": 7})",
+                                       deep,
+                                       head + R"("stages": [{}]})",
+                                       head + R"("stages": [{"history": [3]}]})",
+                                       head + R"("stages": [{"history": [{}], "name": "a"}]})",
+                                       head + R"("quality": {"cells": "many"}})",
+                                       head + R"("quality": {"cells": 1, "worst_cells": [{}]}})",
+                                       head + R"("distance": {"mean_percent": 1}})",
+                                       head + R"("thickness": {"inside": {"asked": {}}}})"};
   for (const std::string& text : wrong) {
     place.file("report.json", text);
     const Run run = place.run("report report.json -o page.html");

@@ -98,13 +98,12 @@ TEST_CASE("Options of scenes and formats are warned of if no output is one", "[c
 
 TEST_CASE("Parts that there are not are refused before any work", "[slow][cli]") {
   const Workplace place;
-  for (const char* words : {"convert template.mesh -o animation:a.glb", "convert template.mesh -o cage:a.mesh",
-                            "convert target.off -o cutaway:a.glb", "convert template.mesh -o cutaway:a.mesh",
-                            "optimize template.mesh -o animation:a.glb",
-                            "convert template.mesh -o cutaway:a.glb --cut w",
-                            "convert template.mesh -o cutaway:a.glb --cut x:0",
-                            "convert template.mesh -o cutaway:a.glb --cut x0.5",
-                            "convert template.mesh -o cutaway:a.glb --cut z:1"}) {
+  for (const char* words :
+       {"convert template.mesh -o animation:a.glb", "convert template.mesh -o cage:a.mesh",
+        "convert target.off -o cutaway:a.glb", "convert template.mesh -o cutaway:a.mesh",
+        "optimize template.mesh -o animation:a.glb", "convert template.mesh -o cutaway:a.glb --cut w",
+        "convert template.mesh -o cutaway:a.glb --cut x:0", "convert template.mesh -o cutaway:a.glb --cut x0.5",
+        "convert template.mesh -o cutaway:a.glb --cut z:1"}) {
     const Run run = place.run(words);
     INFO(words << '\n' << run.err);
     CHECK(run.status == 2);

@@ -218,7 +218,8 @@ TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property
   place.file("tet.ply",
              "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
              "property float wall\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
-             "0 0 0 0.1\n0 1 0 0.1\n1 0 0 0.1\n0 0 1 0.2\n" + faces);
+             "0 0 0 0.1\n0 1 0 0.1\n1 0 0 0.1\n0 0 1 0.2\n" +
+                 faces);
   place.file("wall.txt", "0.1\n0.1\n\n0.1\r\n0.2\n");
   REQUIRE(place.run("shell tet.ply --thickness-attribute wall -o a.mesh --report a.json").status == 0);
   REQUIRE(place.run("shell tet.ply --thickness-file wall.txt -o b.mesh --report b.json").status == 0);

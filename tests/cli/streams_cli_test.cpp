@@ -104,8 +104,8 @@ TEST_CASE("Outputs that are pipes are written to and not read back", "[cli][slow
   for (const std::string& words : {kFit + "--levels 1 --max-iterations 1", std::string("subdivide template.mesh")}) {
     fs::remove(place / "pipe.mesh");
     REQUIRE(mkfifo((place / "pipe.mesh").c_str(), 0600) == 0);
-    const int status = shell(place, "{ cat pipe.mesh > copy.mesh & \"$SUBVOL\" " + words +
-                                        " -o pipe.mesh --quiet; s=$?; wait; exit $s; }");
+    const int status = shell(
+        place, "{ cat pipe.mesh > copy.mesh & \"$SUBVOL\" " + words + " -o pipe.mesh --quiet; s=$?; wait; exit $s; }");
     CHECK(status % 4 == 0);
     CHECK(subvol::read_volume_mesh(place / "copy.mesh").num_cells() == 80);
   }
@@ -118,8 +118,9 @@ TEST_CASE("A link to the standard output is written through, to a file and to a 
   CHECK(shell(place, "\"$SUBVOL\" convert template.mesh -o out.obj --force --quiet | cat > to_pipe.obj") == 0);
   CHECK(content_of(place / "to_file.obj").starts_with("#"));
   CHECK(content_of(place / "to_file.obj") == content_of(place / "to_pipe.obj"));
-  CHECK(shell(place, "export SUBVOL; bash -c '\"$SUBVOL\" template grid --box 0 0 0 1 1 1 --counts 1 1 1 --quiet "
-                     "--report >(cat > r.json); s=$?; sleep 1; exit $s'") == 0);
+  CHECK(shell(place,
+              "export SUBVOL; bash -c '\"$SUBVOL\" template grid --box 0 0 0 1 1 1 --counts 1 1 1 --quiet "
+              "--report >(cat > r.json); s=$?; sleep 1; exit $s'") == 0);
   CHECK(place.json("r.json")["command"] == "template grid");
 }
 

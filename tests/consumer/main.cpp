@@ -18,8 +18,7 @@ int main() {
   cube.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
   cube.add_cell(subvol::CellKind::hex, std::array<subvol::Index, 8>{0, 1, 2, 3, 4, 5, 6, 7});
   const subvol::VolumeMesh fine = subvol::subdivide(subvol::subdivide(cube).fine).fine;
-  const subvol::TriangleMesh target =
-      subvol::triangulate(subvol::boundary_surface(fine, subvol::MeshTopology(fine)));
+  const subvol::TriangleMesh target = subvol::triangulate(subvol::boundary_surface(fine, subvol::MeshTopology(fine)));
   const subvol::FitResult fit = subvol::fit_subdivision_volume(target, cube, {.levels = 1});
   const subvol::QualityReport quality = subvol::measure_quality(fit.mesh);
   std::printf("subvol %s: %zu cells, %zu proved valid\n", subvol::version(), quality.num_cells,

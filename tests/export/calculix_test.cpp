@@ -41,7 +41,8 @@ std::map<int, Vec3> displacements(const TemporaryFolder& folder, const std::stri
   return result;
 }
 
-const std::string kMaterial = "*MATERIAL, NAME=STEEL\n*ELASTIC\n1000., 0.3\n*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL\n";
+const std::string kMaterial =
+    "*MATERIAL, NAME=STEEL\n*ELASTIC\n1000., 0.3\n*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL\n";
 const std::string kEnd = "*NODE PRINT, NSET=NALL\nU\n*END STEP\n";
 
 /// Displacement of a patch test: any affine map.
@@ -57,7 +58,8 @@ std::string patch_model(const std::string& mesh, const std::map<int, Vec3>& node
   text.precision(17);
   text << mesh << kMaterial << "*STEP\n*STATIC\n*BOUNDARY\n";
   for (const auto& [node, x] : nodes)
-    for (int k = 0; is_outer(x) && k < 3; ++k) text << node << ", " << k + 1 << ", " << k + 1 << ", " << affine(x)[k] << '\n';
+    for (int k = 0; is_outer(x) && k < 3; ++k)
+      text << node << ", " << k + 1 << ", " << k + 1 << ", " << affine(x)[k] << '\n';
   text << kEnd;
   return text.str();
 }
@@ -83,16 +85,16 @@ std::map<int, Vec3> nodes_of(const std::string& inp) {
 TEST_CASE("CalculiX passes the patch test on hexes of both orders", "[consumer]") {
   if (!has_ccx()) return;
   VolumeMesh mesh = lattice(2, 2, 2);
-  const auto is_outer = [](const Vec3& x) {
-    return (x.array() < 1e-9).any() || (x.array() > 2 - 1e-9).any();
-  };
+  const auto is_outer = [](const Vec3& x) { return (x.array() < 1e-9).any() || (x.array() > 2 - 1e-9).any(); };
   for (Vec3& x : mesh.positions)
     if (!is_outer(x)) x += Vec3(0.2, -0.15, 0.1);
   for (const int order : {1, 2}) {
     CAPTURE(order);
     const TemporaryFolder folder;
-    if (order == 1) write_volume(folder / "mesh.inp", mesh);
-    else write_volume(folder / "mesh.inp", HighOrderMesh(ElementSpace(mesh, Basis::legendre, 2), mesh));
+    if (order == 1)
+      write_volume(folder / "mesh.inp", mesh);
+    else
+      write_volume(folder / "mesh.inp", HighOrderMesh(ElementSpace(mesh, Basis::legendre, 2), mesh));
     const std::string inp = content_of(folder / "mesh.inp");
     CHECK((inp.find(order == 1 ? "C3D8," : "C3D20,") != std::string::npos));
     const std::map<int, Vec3> nodes = nodes_of(inp);

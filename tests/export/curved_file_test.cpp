@@ -41,8 +41,8 @@ std::vector<Vec3> corners_of(CellKind kind) {
 /// The nodes of a cell of order 2: its corners and the middles between pairs of them.
 std::vector<Vec3> quadratic_nodes(std::vector<Vec3> corners, const Pairs& pairs) {
   std::vector<Vec3> nodes = std::move(corners);
-  for (const auto& [a, b] : pairs) nodes.push_back((nodes[static_cast<std::size_t>(a)] +
-                                                    nodes[static_cast<std::size_t>(b)]) / 2);
+  for (const auto& [a, b] : pairs)
+    nodes.push_back((nodes[static_cast<std::size_t>(a)] + nodes[static_cast<std::size_t>(b)]) / 2);
   return nodes;
 }
 
@@ -53,8 +53,7 @@ const Pairs kPrism{{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4
 const Pairs kNastranPrism{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 4}, {2, 5}, {3, 4}, {4, 5}, {5, 3}};
 const Pairs kGmshPrism{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 4}, {2, 5}, {3, 4}, {3, 5}, {4, 5}};
 const Pairs kHex{{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
-const Pairs kNastranHex{{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 4}, {1, 5},
-                        {2, 6}, {3, 7}, {4, 5}, {5, 6}, {6, 7}, {7, 4}};
+const Pairs kNastranHex{{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 4}, {1, 5}, {2, 6}, {3, 7}, {4, 5}, {5, 6}, {6, 7}, {7, 4}};
 const Pairs kGmshHex{{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}};
 
 std::string number(double value) {
@@ -87,8 +86,7 @@ std::string bdf(const std::vector<Vec3>& nodes, const char* card) {
   std::string text = "BEGIN BULK\n", element = std::string(card) + ",7,3";
   for (std::size_t i = 0; i < nodes.size(); ++i)
     text += "GRID," + std::to_string(1000 - i) + ",," + position(nodes[i], ",") + "\n";
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    element += ((i + 2) % 8 == 0 ? "\n," : ",") + std::to_string(1000 - i);
+  for (std::size_t i = 0; i < nodes.size(); ++i) element += ((i + 2) % 8 == 0 ? "\n," : ",") + std::to_string(1000 - i);
   return text + element + "\nENDDATA\n";
 }
 
@@ -109,7 +107,8 @@ std::string vtk(const std::vector<Vec3>& nodes, int type) {
 
 std::string vtu(const std::vector<Vec3>& nodes, int type) {
   std::string text = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid><Piece NumberOfPoints=\"" +
-                     std::to_string(nodes.size()) + "\" NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" "
+                     std::to_string(nodes.size()) +
+                     "\" NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" "
                      "NumberOfComponents=\"3\" format=\"ascii\">\n";
   for (const Vec3& u : nodes) text += position(u, " ") + "\n";
   const auto array = [](const std::string& name, const std::string& values) {
@@ -132,7 +131,7 @@ void require_bent(const std::filesystem::path& file, CellKind kind) {
 
 VolumeMesh cells_of_all_kinds() {
   VolumeMesh mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0},     {0, 1, 0},     {0, 0, 1},     {1, 0, 1.25},
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0},     {0, 1, 0},     {0, 0, 1},      {1, 0, 1.25},
                     {1, 1, 1}, {0, 1, 1}, {2, 0.5, 0.1}, {2, 0.5, 1.1}, {1.3, 0.5, 2.3}};
   mesh.add_cell(CellKind::hex, std::array<Index, 8>{0, 1, 2, 3, 4, 5, 6, 7});
   mesh.add_cell(CellKind::prism, std::array<Index, 6>{1, 8, 2, 5, 9, 6});

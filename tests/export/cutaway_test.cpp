@@ -56,7 +56,7 @@ TEST_CASE("a cutaway of a box of cubes shows the lower half of it, closed by the
   const ScenePrimitive &surface = scene.nodes[0].primitive, &cut = scene.nodes[1].primitive;
   CHECK(area(surface) == Approx(12 + 14));  // bottom and sides
   CHECK(area(cut) == Approx(12));
-  CHECK(cut.positions.size() == 4 * 12);    // every face by itself
+  CHECK(cut.positions.size() == 4 * 12);                                 // every face by itself
   CHECK(signed_volume(surface) + signed_volume(cut) == Approx(6 * 12));  // outward, and closed
   for (const Vec3& normal : cut.normals) CHECK(normal.z() == Approx(1));
   // Edges of both, once each: of the bottom, the uprights, and of the cut inside its rim.

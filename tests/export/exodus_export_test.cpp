@@ -152,8 +152,8 @@ TEST_CASE("exodus: VTK sees the same cells, curved and straight", "[export][cons
         const CellKind kind = cells.kinds[written[i]];
         for (const Vec3& u : {Vec3(0.1, 0.2, 0.3), Vec3(0.5, 0.1, 0.2), Vec3(0.05, 0.6, 0.2), Vec3(0, 0.3, 0)}) {
           const Vec3 x = mesh.position(written[i], u);
-          out << i << ' ' << kTypes[order - 1][static_cast<std::size_t>(kind)] << ' '
-              << num_lattice_points(kind, order) << ' ' << u.transpose() << ' ' << x.transpose() << '\n';
+          out << i << ' ' << kTypes[order - 1][static_cast<std::size_t>(kind)] << ' ' << num_lattice_points(kind, order)
+              << ' ' << u.transpose() << ' ' << x.transpose() << '\n';
         }
       }
     }

@@ -226,9 +226,9 @@ TEST_CASE("a scene of sheets has a node for each with its attribute and colors, 
   const PolygonMesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {0, 4}, {0, 1, 2, 3}};
   PolygonMesh above = square;
   for (Vec3& p : above.positions) p.z() = 1;
-  const std::vector<SceneSheet> sheets{{.name = "lower", .mesh = square},
-                                       {.name = "upper", .mesh = above, .attribute = {"_HEIGHT", {1, 2, 3, 4}},
-                                        .shades = {0, 0.3, 0.6, 1}}};
+  const std::vector<SceneSheet> sheets{
+      {.name = "lower", .mesh = square},
+      {.name = "upper", .mesh = above, .attribute = {"_HEIGHT", {1, 2, 3, 4}}, .shades = {0, 0.3, 0.6, 1}}};
   const Scene scene = sheet_scene(sheets, "a map");
   REQUIRE(scene.nodes.size() == 3);
   CHECK(scene.nodes[0].name == "lower");

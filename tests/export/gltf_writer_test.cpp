@@ -37,8 +37,10 @@ Scene two_quads(const Vec3& offset = Vec3(1e5, -2e5, 3e4)) {
   for (const double q : {-0.5, 0.0, 0.25, 0.5, 0.75, 1.0}) quads.colors.push_back(quality_color(q));
   quads.attributes = {{"_SCALED_JACOBIAN", {-0.5, 0.0, 0.25, 0.5, 0.75, 1.0}}};
   quads.indices = {0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4};
-  ScenePrimitive lines{.topology = ScenePrimitive::Topology::lines, .positions = quads.positions,
-                       .indices = {0, 1, 1, 2}, .material_color = {0, 0, 0, 1}};
+  ScenePrimitive lines{.topology = ScenePrimitive::Topology::lines,
+                       .positions = quads.positions,
+                       .indices = {0, 1, 1, 2},
+                       .material_color = {0, 0, 0, 1}};
   return {.name = "two quads",
           .nodes = {{"surface", quads}, {"wireframe", lines}},
           .origin = offset + Vec3(1, 0.5, 0.05),

@@ -146,7 +146,7 @@ TEST_CASE("edges of curved cells are creases only where their faces meet sharply
     HighOrderPatches patches(mesh, angle);
     return tessellate(patches, 1).positions.size();  // the coarsest: the quads of one refinement
   };
-  const std::size_t welded = 6 * 16 * 1 + 2;         // V = Q + 2 with Q = 6 * 4 * 4
+  const std::size_t welded = 6 * 16 * 1 + 2;  // V = Q + 2 with Q = 6 * 4 * 4
   CHECK(num_vertices(180) == welded);
   CHECK(num_vertices(30) == 6 * 25);
   CHECK(num_vertices(0) > 6 * 25);

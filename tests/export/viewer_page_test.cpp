@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the viewer's page holds: the points of straight and curved cells, packed arrays, fields.
 
+#include "subvol/export/viewer_page.h"
 #include "subvol/base/base64.h"
 #include "subvol/base/error.h"
 #include "subvol/export/packed_array.h"
 #include "subvol/export/viewer_content.h"
-#include "subvol/export/viewer_page.h"
 #include "tests/support/sample_meshes.h"
 
+#include <zlib.h>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
-#include <zlib.h>
 
 #include <bit>
 #include <cmath>

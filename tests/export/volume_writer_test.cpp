@@ -109,8 +109,8 @@ TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and e
       CHECK(x == expected);
     }
   line("$EndNodes $Elements 4 4 1 4");
-  line("3 1 6 1 1 2 9 3 6 10 7");                        // reference 0: prism
-  line("3 2 6 1 2 4 11 1 8 12 5");                       // reference 2: prism, hex
+  line("3 1 6 1 1 2 9 3 6 10 7");   // reference 0: prism
+  line("3 2 6 1 2 4 11 1 8 12 5");  // reference 2: prism, hex
   line("3 2 5 1 3");
   for (const Index v : mesh.cell(0)) expect(std::to_string(v + 1));
   line("3 3 4 1 4 6 10 7 13 $EndElements $ElementData 1 \"scaled_jacobian\" 1 0 3 0 1 4");

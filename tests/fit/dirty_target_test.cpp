@@ -107,8 +107,13 @@ struct Damage {
 };
 
 /// The ball's diagonal is about 3.5 radii.
-const Damage kDamages[] = {{"soup", tear},       {"flips", flip}, {"duplicates", repeat},      {"uneven", make_uneven},
-                           {"fins", add_fins},   {"holes", pierce}, {"far vertices", add_far_vertices},
+const Damage kDamages[] = {{"soup", tear},
+                           {"flips", flip},
+                           {"duplicates", repeat},
+                           {"uneven", make_uneven},
+                           {"fins", add_fins},
+                           {"holes", pierce},
+                           {"far vertices", add_far_vertices},
                            {"noise", shake, kNoise / 3.5}};
 
 bool has(const std::vector<std::string>& warnings, const std::string& words) {

@@ -158,9 +158,7 @@ TEST_CASE("the worst places of a fit are lifted where that costs little distance
 }
 
 TEST_CASE("few places far from the target are drawn in where that costs little shape", "[slow]") {
-  const auto is_kept_draw = [](const StageRecord& stage) {
-    return stage.kept && stage.name.ends_with("% off");
-  };
+  const auto is_kept_draw = [](const StageRecord& stage) { return stage.kept && stage.name.ends_with("% off"); };
   std::size_t drawn = 0;
   for (samples::Sample& sample : samples::all_samples()) {
     sample.template_mesh.tags = {};  // creases would keep the surface near

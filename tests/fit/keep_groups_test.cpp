@@ -42,8 +42,8 @@ TriangleMesh grouped_sphere(int levels) {
   }
   mesh.face_groups.groups = {{"north", 1, 2}, {"south", 2, 2}};
   for (const auto& t : mesh.triangles)
-    mesh.face_groups.of_face.push_back(
-        (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]])[2] > 0 ? 0 : 1);
+    mesh.face_groups.of_face.push_back((mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]])[2] > 0 ? 0
+                                                                                                                   : 1);
   return mesh;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/mesh_check.h"
 #include "subvol/base/error.h"
 #include "subvol/export/export.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/closest_point.h"
-#include "subvol/fit/mesh_check.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"
@@ -76,8 +76,7 @@ TEST_CASE("a ring and a hollow block have their topology", "[mesh_check]") {
   CHECK(ring.valid());
   CHECK(ring.boundary_euler_number == 0);
   CHECK(ring.euler_number == 0);
-  const MeshCheck hollow =
-      check_mesh(voxels(3, 3, 3, [](int i, int j, int k) { return i != 1 || j != 1 || k != 1; }));
+  const MeshCheck hollow = check_mesh(voxels(3, 3, 3, [](int i, int j, int k) { return i != 1 || j != 1 || k != 1; }));
   CHECK(hollow.valid());
   CHECK(hollow.num_boundary_components == 2);
   CHECK(hollow.boundary_euler_number == 4);

@@ -119,8 +119,7 @@ TEST_CASE("Optimization keeps creases that the mesh's tags name, whatever their 
     p.y() = kLine;  // a line across the top that even cells would leave
     line.push_back(static_cast<Index>(v));
   }
-  std::sort(line.begin(), line.end(),
-            [&](Index a, Index b) { return mesh.positions[a].x() < mesh.positions[b].x(); });
+  std::sort(line.begin(), line.end(), [&](Index a, Index b) { return mesh.positions[a].x() < mesh.positions[b].x(); });
   const auto farthest_from_line = [&] {
     const OptimizeResult result = optimize_mesh(mesh, nullptr, {.sizes = CellSizes::uniform});
     CHECK(result.uncertified.empty());

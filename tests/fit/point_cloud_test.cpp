@@ -46,8 +46,7 @@ TriangleMesh boundary_of(const HighOrderMesh& mesh) {
 
 std::string ply_header(const std::string& counts) { return "ply\nformat ascii 1.0\n" + counts + "end_header\n"; }
 
-constexpr const char* kTenPoints =
-    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 0\n1 0 1\n0 1 1\n1 1 1\n2 0 0\n0 2 0\n";
+constexpr const char* kTenPoints = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 0\n1 0 1\n0 1 1\n1 1 1\n2 0 0\n0 2 0\n";
 
 PointCloud read(const std::string& name, const std::string& text, std::vector<std::string>* warnings = nullptr) {
   const TemporaryFolder folder;

@@ -202,7 +202,8 @@ TEST_CASE("Curved cells follow the interfaces of a target with regions, whatever
   for (const Vec3& p : samples.positions.apply(fit.mesh.coefficients)) CHECK(p.norm() == Approx(0.6).epsilon(0.03));
 
   // Curved cells that are drawn to a surface without regions keep their interfaces, as curved as they are.
-  const HighOrderFitResult drawn = fit_high_order(box_surface({-1, -1, -1}, {1, 1, 1.2}), fit.mesh, start, {.order = 2});
+  const HighOrderFitResult drawn =
+      fit_high_order(box_surface({-1, -1, -1}, {1, 1, 1.2}), fit.mesh, start, {.order = 2});
   CHECK(measure_quality(drawn.mesh).certificate.not_certified.empty());
   for (const Vec3& p : samples.positions.apply(drawn.mesh.coefficients)) CHECK(p.norm() == Approx(0.6).epsilon(0.03));
   for (int& reference : start.references) reference = 8;

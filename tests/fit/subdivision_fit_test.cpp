@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/subdivision_fit.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/certificate/certificate.h"
@@ -10,7 +11,6 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/optimize_mesh.h"
 #include "subvol/fit/stages/fit_report.h"
-#include "subvol/fit/subdivision_fit.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 #include "subvol/surface/boundary.h"

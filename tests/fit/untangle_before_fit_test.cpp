@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/untangle_before_fit.h"
+#include "subvol/fit/certificate/certificate.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>

@@ -105,8 +105,10 @@ void read_checkpoint_of(std::string_view bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    if (kExtension == ".checkpoint") read_checkpoint_of({reinterpret_cast<const char*>(data), size});
-    else read(subvol::fuzz::as_file(data, size));
+    if (kExtension == ".checkpoint")
+      read_checkpoint_of({reinterpret_cast<const char*>(data), size});
+    else
+      read(subvol::fuzz::as_file(data, size));
   } catch (const subvol::InputError& error) {
     require(std::string_view(error.what()).size() > 3);
   }

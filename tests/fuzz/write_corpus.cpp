@@ -69,19 +69,23 @@ void write_volumes(const fs::path& folder) {
   const std::string cell("\0\0\0\4\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3", 20), type("\0\0\0\n", 4);
   write(folder / "vtk", "binary",
         head + std::string(96, '\1') + "\nCELLS 1 5\n" + cell + "\nCELL_TYPES 1\n" + type + "\n");
-  write(folder / "vtk", "offsets", "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
-                                   "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
-                                   "vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n");
+  write(folder / "vtk", "offsets",
+        "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
+        "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
+        "vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n");
 }
 
 void write_variants(const fs::path& folder) {
-  write(folder / "msh", "old", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n"
-                               "4 0 0 1\n$EndNodes\n$Elements\n2\n2 2 2 8 1 9 5 3\n3 4 2 6 1 9 3 5 4\n$EndElements\n");
-  write(folder / "msh", "four", "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
-                                "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
-                                "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n");
-  write(folder / "inp", "sets", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n1,1,2,3,4\n"
-                                "*ELSET,ELSET=g,GENERATE\n1,9,2\n*ELSET,ELSET=s\ng,e\n*SURFACE,NAME=f\ns,S2\n");
+  write(folder / "msh", "old",
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n"
+        "4 0 0 1\n$EndNodes\n$Elements\n2\n2 2 2 8 1 9 5 3\n3 4 2 6 1 9 3 5 4\n$EndElements\n");
+  write(folder / "msh", "four",
+        "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
+        "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
+        "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n");
+  write(folder / "inp", "sets",
+        "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n1,1,2,3,4\n"
+        "*ELSET,ELSET=g,GENERATE\n1,9,2\n*ELSET,ELSET=s\ng,e\n*SURFACE,NAME=f\ns,S2\n");
   write(folder / "inp", "parts",
         "*PART,NAME=p\n*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n"
         "1,1,2,3,4\n*NSET,NSET=n\n1,2,3\n*END PART\n*ASSEMBLY,NAME=a\n*INSTANCE,NAME=p-1,PART=p\n"
@@ -90,15 +94,17 @@ void write_variants(const fs::path& folder) {
   write(folder / "bdf", "systems",
         "CORD2C,5,0,1.,2.,3.,2.,2.,3.\n,1.,3.,3.\nCORD1S,6,1,2,3\nGRDSET,,5\nGRID,1,0,0.,0.,0.\nGRID,2,0,1.,0.,0.\n"
         "=,*(1),=,=,*(1.),=\nGRID,4,6,1.,90.,0.\nCTETRA,1,1,1,2,3,4\n=,*(1),==\n=(2)\nBEGIN BULK\nENDDATA\n");
-  write(folder / "bdf", "fields", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID           3              0.    1.+0\n"
-                                  "GRID*                  4\n*                      1.\nCTETRA,1,1,1,2,3,4\n"
-                                  "CTRIA3,2,5,1,2,3\n");
-  write(folder / "vtu", "ascii", "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid><Piece "
-                                 "NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" "
-                                 "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells><DataArray "
-                                 "type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" "
-                                 "Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">10</DataArray>"
-                                 "</Cells></Piece></UnstructuredGrid></VTKFile>");
+  write(folder / "bdf", "fields",
+        "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID           3              0.    1.+0\n"
+        "GRID*                  4\n*                      1.\nCTETRA,1,1,1,2,3,4\n"
+        "CTRIA3,2,5,1,2,3\n");
+  write(folder / "vtu", "ascii",
+        "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid><Piece "
+        "NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" "
+        "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells><DataArray "
+        "type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" "
+        "Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">10</DataArray>"
+        "</Cells></Piece></UnstructuredGrid></VTKFile>");
 }
 
 void write_surfaces(const fs::path& folder) {
@@ -132,12 +138,14 @@ void write_surfaces(const fs::path& folder) {
   write(folder / "off", "colors",
         "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
         "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
-  write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
-                                   "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
+  write(folder / "obj", "slashes",
+        "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+        "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
   fs::create_directories(folder / "obj");
   write_obj(folder / "obj" / "bowl.obj", samples::bowl_surface(1));
-  write(folder / "stl", "text", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
-                                "endloop\nendfacet\nendsolid a\n");
+  write(folder / "stl", "text",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+        "endloop\nendfacet\nendsolid a\n");
   std::string binary(84 + 2 * 50, '\0');
   const std::uint32_t count = 2;
   std::memcpy(binary.data() + 80, &count, sizeof count);
@@ -209,7 +217,8 @@ void write_points(const fs::path& folder) {
   write(folder / "xyz", "columns", "# points\n" + lines + "1e3 -2.5 .5 0 0 1 255\n");
   write(folder / "ply", "points",
         "ply\nformat ascii 1.0\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\n"
-        "end_header\n" + lines);
+        "end_header\n" +
+            lines);
 }
 
 void write_program_files(const fs::path& folder) {
@@ -224,9 +233,10 @@ void write_program_files(const fs::path& folder) {
   write(folder / "json", "shell", R"({"subvol": "0.1", "command": "shell", "valid": true, "thickness": {"inside":
 {"asked": {"mean": 1, "min": 1, "max": 1}}}, "input": {"surface": {"path": "s.obj"}}})");
   write(folder / "toml", "flat", "levels = 2 # and\n tolerance=0.5\nforce = true\ncage-only = false\n");
-  write(folder / "toml", "tables", "[fit]\noutput = [\"a.mesh\", 'b.glb']\ntemplate = \"t.mesh\"\n[shell]\n"
-                                   "side = \"both\"\ngrowth = 1.5\n[check]\njson = true\n[optimize]\n"
-                                   "lambda = 1e-3\ntime-limit = 5\n");
+  write(folder / "toml", "tables",
+        "[fit]\noutput = [\"a.mesh\", 'b.glb']\ntemplate = \"t.mesh\"\n[shell]\n"
+        "side = \"both\"\ngrowth = 1.5\n[check]\njson = true\n[optimize]\n"
+        "lambda = 1e-3\ntime-limit = 5\n");
   write(folder / "txt", "thickness", "0.1\n 2e-3 \r\n\n17\n");
 }
 

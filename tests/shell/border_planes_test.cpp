@@ -22,10 +22,13 @@ namespace {
 /// A pipe around the z axis, radius 1; its lower end lies in z = 0, its upper one in z = 2 + slope x.
 PolygonMesh pipe(double slope, Faces faces = Faces::triangles) {
   constexpr int kAround = 16, kAlong = 4;
-  return grid(kAround, kAlong, faces, [&](double i, double j) {
-    const double angle = 2 * std::numbers::pi * i / kAround, x = std::cos(angle), y = std::sin(angle);
-    return Vec3(x, y, j / kAlong * (2 + slope * x));
-  }, true);
+  return grid(
+      kAround, kAlong, faces,
+      [&](double i, double j) {
+        const double angle = 2 * std::numbers::pi * i / kAround, x = std::cos(angle), y = std::sin(angle);
+        return Vec3(x, y, j / kAlong * (2 + slope * x));
+      },
+      true);
 }
 
 /// Half of a pipe: its ends are half circles, its sides straight.

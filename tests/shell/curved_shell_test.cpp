@@ -55,8 +55,9 @@ TEST_CASE("On a flat surface curved layers stay straight, whatever its faces", "
       const CurvedShell curved = curve_shell(shell, {.order = 3, .basis = basis});
       check_valid(shell, curved);
       for (std::size_t i = 0; i < curved.mesh.coefficients.size(); ++i)
-        REQUIRE((curved.mesh.coefficients[i] -
-                 (i < shell.mesh.num_vertices() ? shell.mesh.positions[i] : Vec3(0, 0, 0))).norm() < 1e-9);
+        REQUIRE(
+            (curved.mesh.coefficients[i] - (i < shell.mesh.num_vertices() ? shell.mesh.positions[i] : Vec3(0, 0, 0)))
+                .norm() < 1e-9);
       CHECK(curved.quality.min_scaled_jacobian == Approx(1).epsilon(1e-9));
       CHECK(curved.thickness.achieved[0] == Approx(0.1).epsilon(1e-9));
     }

@@ -61,8 +61,7 @@ TEST_CASE("Faces of a shell are in groups: those of the surface, its sheets and 
   PolygonMesh patch = plane(Faces::quads);  // 6 x 4 quads, 20 border edges
   const auto outward = faces_by_group(make_shell(patch, {.thickness = 0.1, .layers = 2}).mesh);
   CHECK(outward == std::map<std::string, std::size_t>{{"wall", 24}, {"outer", 24}, {"rim", 40}});
-  const auto inward =
-      faces_by_group(make_shell(patch, {.thickness = 0.1, .side = ShellSide::inward}).mesh);
+  const auto inward = faces_by_group(make_shell(patch, {.thickness = 0.1, .side = ShellSide::inward}).mesh);
   CHECK(inward == std::map<std::string, std::size_t>{{"wall", 24}, {"inner", 24}, {"rim", 20}});
   patch.face_groups = {{{"hot", 4}, {"outer", 1}}, std::vector<Index>(24, 0)};
   patch.face_groups.of_face[3] = 1;

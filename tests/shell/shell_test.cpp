@@ -196,9 +196,9 @@ TEST_CASE("A sphere's shell is as thick as its energy says, and has that volume"
 TEST_CASE("A tube's shell is as thick as its energy says", "[shell]") {
   // Stretched once at the outer corners: E(h) = ln^2(h/d)/2 + ln^2((R + h)/R)/4, and nothing along the axis.
   const double d = 0.3;
-  const PolygonMesh tube = grid(48, 8, Faces::quads, [](double i, double j) {
-    return Vec3(std::cos(2 * kPi * i / 48), std::sin(2 * kPi * i / 48), j / 8);
-  }, true);
+  const PolygonMesh tube = grid(
+      48, 8, Faces::quads,
+      [](double i, double j) { return Vec3(std::cos(2 * kPi * i / 48), std::sin(2 * kPi * i / 48), j / 8); }, true);
   const double h = zero_of([&](double t) { return std::log(t / d) / t + 0.5 * std::log(1 + t) / (1 + t); }, 0.1, 0.4);
   const ShellResult shell = make_shell(tube, {.thickness = d});
   check_valid(shell);

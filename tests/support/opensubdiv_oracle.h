@@ -18,8 +18,8 @@ OracleLevels oracle_refine(const VolumeMesh& mesh, int levels);
 /// OpenSubdiv's positions of the children of the first refinement of the boundary, or of all sheets as one non-manifold
 /// surface.
 struct OracleChildren {
-  std::vector<Index> vertices;                     ///< volume vertex of each vertex of the surface
-  std::vector<std::array<Index, 2>> edges;         ///< its edges, by volume vertices, smaller first
+  std::vector<Index> vertices;              ///< volume vertex of each vertex of the surface
+  std::vector<std::array<Index, 2>> edges;  ///< its edges, by volume vertices, smaller first
   std::vector<Vec3> vertex_children, edge_children;
 };
 enum class OracleFaces { boundary, sheets };

@@ -42,14 +42,19 @@ class UsdaFile {
 
  private:
   static const std::map<std::string, std::string>& schema() {
-    static const std::map<std::string, std::string> types{
-        {"extent", "float3[]"},           {"points", "point3f[]"},
-        {"faceVertexCounts", "int[]"},    {"faceVertexIndices", "int[]"},
-        {"creaseIndices", "int[]"},       {"creaseLengths", "int[]"},
-        {"creaseSharpnesses", "float[]"}, {"cornerIndices", "int[]"},
-        {"cornerSharpnesses", "float[]"}, {"subdivisionScheme", "uniform token"},
-        {"orientation", "uniform token"}, {"interpolateBoundary", "token"},
-        {"triangleSubdivisionRule", "token"}};
+    static const std::map<std::string, std::string> types{{"extent", "float3[]"},
+                                                          {"points", "point3f[]"},
+                                                          {"faceVertexCounts", "int[]"},
+                                                          {"faceVertexIndices", "int[]"},
+                                                          {"creaseIndices", "int[]"},
+                                                          {"creaseLengths", "int[]"},
+                                                          {"creaseSharpnesses", "float[]"},
+                                                          {"cornerIndices", "int[]"},
+                                                          {"cornerSharpnesses", "float[]"},
+                                                          {"subdivisionScheme", "uniform token"},
+                                                          {"orientation", "uniform token"},
+                                                          {"interpolateBoundary", "token"},
+                                                          {"triangleSubdivisionRule", "token"}};
     return types;
   }
 

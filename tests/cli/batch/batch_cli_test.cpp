@@ -50,7 +50,9 @@ class BatchPlace {
     fs::permissions(place_ / "actor", fs::perms::owner_all);
   }
 
-  Run act(const std::string& words) const { return place_.run("batch --program ./actor --quiet --verb check " + words); }
+  Run act(const std::string& words) const {
+    return place_.run("batch --program ./actor --quiet --verb check " + words);
+  }
   pid_t start(const std::string& words) const {
     return place_.start("batch --program ./actor --quiet --verb check " + words);
   }
@@ -152,8 +154,9 @@ TEST_CASE("A batch runs verbs, keeps what they write, and records what is true o
   place.file("bad.off", content_of(place / "target.off"));
   CHECK(place.run("batch m.csv -o out --dry-run").out == "bad\n");
   CHECK(place.run("batch m.csv -o out --only rejected --dry-run").out == "bad\ngone\n");
-  place.file("m.csv", "id,verb,input,options\nball,template auto,target.off,--cells 60\nmesh,check,template.mesh,"
-                      "--target target.off\n");
+  place.file("m.csv",
+             "id,verb,input,options\nball,template auto,target.off,--cells 60\nmesh,check,template.mesh,"
+             "--target target.off\n");
   CHECK(place.run("batch m.csv -o out --dry-run").out == "ball\n");
 }
 
@@ -164,8 +167,9 @@ TEST_CASE("A crash, a signal and a time limit cost one record", "[cli][batch][sl
   CHECK(place.act("m.csv -o out --jobs 4 --time-limit 1 --grace 0.5").status == 1);
   CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(15));
   const std::map<std::string, std::string> wanted{
-      {"good1", "valid"},        {"good2", "valid"},   {"family", "valid"},      {"crash", "crash"},     {"killed", "killed"},
-      {"slow", "time_limit"}, {"stubborn", "time_limit"}, {"status2", "usage"}, {"status3", "rejected"}, {"status17", "error"}};
+      {"good1", "valid"},      {"good2", "valid"},     {"family", "valid"},        {"crash", "crash"},
+      {"killed", "killed"},    {"slow", "time_limit"}, {"stubborn", "time_limit"}, {"status2", "usage"},
+      {"status3", "rejected"}, {"status17", "error"}};
   for (const auto& [id, outcome] : wanted) {
     INFO(id);
     CHECK(place.class_of(id) == outcome);
@@ -263,7 +267,8 @@ TEST_CASE("Ctrl-C ends a batch in order, and it goes on afterwards", "[cli][batc
 TEST_CASE("Shards, jobs and threads make the same results and records", "[cli][batch][slow]") {
   const Workplace place;
   std::string rows = "id,verb,input,cells\n";
-  for (int i = 0; i < 8; ++i) rows += "m" + std::to_string(i) + ",template auto,target.off," + std::to_string(20 + 5 * i) + "\n";
+  for (int i = 0; i < 8; ++i)
+    rows += "m" + std::to_string(i) + ",template auto,target.off," + std::to_string(20 + 5 * i) + "\n";
   place.file("m.csv", rows);
   CHECK(place.run("batch m.csv -o whole --jobs 1 --threads 2 --quiet").status == 0);
   for (const char* shard : {"3/3", "1/3", "2/3"}) {
@@ -288,7 +293,8 @@ TEST_CASE("The report of a batch is one page, and compares with another", "[cli]
   const std::string batch = "batch m.csv --verb template --quiet";
   CHECK(place.run("batch m.csv --quiet -o one --verb template").status == 3);  // not a verb, but a group
   for (const char* cells : {"60", "20"}) {
-    place.file("m.csv", std::string("id,verb,input,cells\nball,template auto,target.off,") + cells + "\nsurface,check,target.off,\n");
+    place.file("m.csv", std::string("id,verb,input,cells\nball,template auto,target.off,") + cells +
+                            "\nsurface,check,target.off,\n");
     CHECK(place.run(std::string("batch m.csv --quiet -o with") + cells).status == 0);
   }
   const Run run = place.run("batch report with20 -o page.html --compare with60 --json");

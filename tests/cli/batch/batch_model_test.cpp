@@ -60,7 +60,8 @@ TEST_CASE("Outputs are named by their part and extension", "[cli][batch]") {
 TEST_CASE("The words of a model name its files, outputs and report", "[cli][batch]") {
   const BatchVerb fit{{"template", "auto"}, {"--output", "--report", "--quiet", "--target"}};
   const BatchModel model{"x", "template auto", "a.off", {"--target", "b.off"}, {"mesh", "boundary:vtu"}};
-  const auto words = model_words(model, fit, [](const std::string& word) { return word == "--target" ? word : "/" + word; });
+  const auto words =
+      model_words(model, fit, [](const std::string& word) { return word == "--target" ? word : "/" + word; });
   CHECK(words == std::vector<std::string>{"template", "auto", "/a.off", "--target", "/b.off", "-o", "result.mesh", "-o",
                                           "boundary:boundary.vtu", "--report", "report.json", "--quiet"});
 }
@@ -100,7 +101,8 @@ TEST_CASE("Words that name files become absolute, others stay", "[cli][batch]") 
   CHECK(hasher.absolute(model, "t.mesh") == base + "/t.mesh");
   CHECK(hasher.absolute(model, "--template=t.mesh") == "--template=" + base + "/t.mesh");
   CHECK(hasher.absolute(model, "missing.off") == base + "/missing.off");
-  for (const char* word : {"--template", "300", "no.mesh", "--cells=3", "-1"}) CHECK(hasher.absolute(model, word) == word);
+  for (const char* word : {"--template", "300", "no.mesh", "--cells=3", "-1"})
+    CHECK(hasher.absolute(model, word) == word);
 }
 
 TEST_CASE("What a model asks for has another hash if a word, an output or the program differs", "[cli][batch]") {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Quantiles, worst models, and what differs between two batches.
 
-#include "cli/batch/batch_page.h"
 #include "cli/batch/batch_summary.h"
+#include "cli/batch/batch_page.h"
 #include "cli/batch/record_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -34,8 +34,8 @@ BatchSummary summary_of(const std::vector<Given>& models) {
                       {"distance", {{"mean_percent", given.mean_percent}}}};
     ChildEnd end;
     end.cpu_seconds = given.cpu_seconds;
-    records.append(record_line({given.id, "fit", "a.off", {}, {}}, {"1", "2", "3"}, {given.outcome, "because <of> it"}, end,
-                               {.report = is_failure(given.outcome) ? Json() : report}, "", 0));
+    records.append(record_line({given.id, "fit", "a.off", {}, {}}, {"1", "2", "3"}, {given.outcome, "because <of> it"},
+                               end, {.report = is_failure(given.outcome) ? Json() : report}, "", 0));
   }
   return summarize(std::vector{folder.path()});
 }
@@ -50,10 +50,14 @@ const std::vector<Given> kBefore{{"a", Outcome::valid, 0.5, 0.01, 10}, {"b", Out
                                  {"c", Outcome::crash, 0, 0, 1},       {"d", Outcome::crash, 0, 0, 1},
                                  {"e", Outcome::valid, 0.5, 0.01, 10}, {"f", Outcome::valid, 0.5, 0.01, 10},
                                  {"g", Outcome::valid, 0.5, 0.01, 10}, {"old", Outcome::valid, 0.5, 0.01, 10}};
-const std::vector<Given> kNow{{"a", Outcome::not_converged, 0.495, 0.0105, 12}, {"b", Outcome::time_limit, 0, 0, 60},
-                              {"c", Outcome::valid, 0.4, 0.01, 9},              {"d", Outcome::rejected, 0, 0, 1},
-                              {"e", Outcome::valid, 0.48, 0.01, 10},            {"f", Outcome::valid, 0.6, 0.02, 10},
-                              {"g", Outcome::valid, 0.5, 0.01, 14},             {"new", Outcome::valid, 0.1, 0.01, 10}};
+const std::vector<Given> kNow{{"a", Outcome::not_converged, 0.495, 0.0105, 12},
+                              {"b", Outcome::time_limit, 0, 0, 60},
+                              {"c", Outcome::valid, 0.4, 0.01, 9},
+                              {"d", Outcome::rejected, 0, 0, 1},
+                              {"e", Outcome::valid, 0.48, 0.01, 10},
+                              {"f", Outcome::valid, 0.6, 0.02, 10},
+                              {"g", Outcome::valid, 0.5, 0.01, 14},
+                              {"new", Outcome::valid, 0.1, 0.01, 10}};
 
 }  // namespace
 
@@ -114,8 +118,9 @@ TEST_CASE("The page of a batch loads nothing and escapes what it shows", "[cli][
   const std::string page = batch_page("my <batch>", now, {{worst_models(now, 1)[0], "worst", "png"}}, &comparison,
                                       [](const ModelFigures& model) { return "models/" + model.id + "/report.json"; });
   CHECK(page.starts_with("<!DOCTYPE html>"));
-  for (const char* text : {"5 valid", "62.5 %", "time_limit", "my &lt;batch&gt;", "because &lt;of&gt; it", "last &lt;week&gt;",
-                           "href=\"models/b/report.json\"", "data:image/png;base64,cG5n", "fails now", "Quantiles"})
+  for (const char* text :
+       {"5 valid", "62.5 %", "time_limit", "my &lt;batch&gt;", "because &lt;of&gt; it", "last &lt;week&gt;",
+        "href=\"models/b/report.json\"", "data:image/png;base64,cG5n", "fails now", "Quantiles"})
     CHECK(page.find(text) != std::string::npos);
   for (const char* text : {"<script", "http://", "https://", "<of>"}) CHECK(page.find(text) == std::string::npos);
   CHECK(batch_page("none", summary_of({}), {}, nullptr, [](const ModelFigures&) { return ""; }).find("0 models") !=

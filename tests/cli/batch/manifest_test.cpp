@@ -136,7 +136,8 @@ TEST_CASE("A manifest that is not understood is refused with its line", "[cli][b
   CHECK(refusal("m.csv", "id,input\na,\n") == "m.csv:2: expected an 'input'");
   CHECK(refusal("m.csv", "input,cels\na,3\n").starts_with("m.csv:2: fit has no option '--cels'"));
   CHECK(refusal("m.csv", "input,verb\na,batch\n") == "m.csv:2: 'verb': there is no verb 'batch' for a batch");
-  CHECK(refusal("m.csv", "input,options\na,-o x.mesh\n").starts_with("m.csv:2: -o: the batch gives this option itself"));
+  CHECK(
+      refusal("m.csv", "input,options\na,-o x.mesh\n").starts_with("m.csv:2: -o: the batch gives this option itself"));
   CHECK(refusal("m.csv", "input,options\na,'open\n").starts_with("m.csv:2: column 'options': expected another '"));
   CHECK(refusal("m.csv", "input,verb,outputs\na,check,mesh\n") == "m.csv:2: 'outputs': check writes none");
   CHECK(refusal("m.jsonl", "{\"input\": \"a\"}\n[1]\n").starts_with("m.jsonl:2: expected an object in JSON"));

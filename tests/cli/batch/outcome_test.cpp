@@ -46,8 +46,9 @@ TEST_CASE("Outcomes follow exit statuses, signals and reports", "[cli][batch]") 
 
 TEST_CASE("Every failure has a reason in one line", "[cli][batch]") {
   CHECK(judged(1, 0, {.report = kUnproved}).reason == "3 of 8 cells are not certified");
-  const Json open{{"fillable", false},
-                  {"findings", {{"open_rim", {{"prevents_filling", true}}}, {"sharp_angle", {{"prevents_filling", false}}}}}};
+  const Json open{
+      {"fillable", false},
+      {"findings", {{"open_rim", {{"prevents_filling", true}}}, {"sharp_angle", {{"prevents_filling", false}}}}}};
   CHECK(judged(1, 0, {.report = open, .has_outputs = true}).reason == "open_rim");
   CHECK(judged(3, 0, {.last_message = "a.off:3: expected"}).reason == "a.off:3: expected");
   CHECK(judged(17, 0).reason == "exit status 17");

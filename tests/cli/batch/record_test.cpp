@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Records: written and read, claimed by several processes, and the plan that they lead to.
 
+#include "cli/batch/record.h"
 #include "cli/batch/batch_plan.h"
 #include "cli/batch/latest_records.h"
-#include "cli/batch/record.h"
 #include "cli/batch/record_file.h"
 #include "subvol/base/version.h"
 #include "tests/support/temporary_folder.h"
@@ -73,8 +73,8 @@ TEST_CASE("A record is one line that gives its fields back", "[cli][batch]") {
   CHECK(json["certified"] == true);
   CHECK(json["outputs"] == Json{"result.mesh"});
   CHECK(Json::parse(without_run(line)).contains("run") == false);
-  for (const std::string& damaged : {line.substr(0, line.size() / 2), std::string("{}"), std::string(), std::string("\0", 1),
-                                     std::string("{\"id\":\"x\"}"), "x" + line})
+  for (const std::string& damaged : {line.substr(0, line.size() / 2), std::string("{}"), std::string(),
+                                     std::string("\0", 1), std::string("{\"id\":\"x\"}"), "x" + line})
     CHECK(reader.read(damaged) == nullptr);
   CHECK(std::isnan(reader.read(line_of(model_named("y")))->cells));  // nothing is left of the record before
 }
@@ -83,7 +83,9 @@ TEST_CASE("Only one process has a claim; it ends with the process and with those
   const TemporaryFolder folder;
   RecordFile records(folder.path());
   REQUIRE(records.claim("a"));
-  const auto claims = [&](const char* id) { return in_process([&] { return int(RecordFile(folder.path()).claim(id)); }); };
+  const auto claims = [&](const char* id) {
+    return in_process([&] { return int(RecordFile(folder.path()).claim(id)); });
+  };
   CHECK(claims("a") == 0);
   CHECK(claims("b") == 1);
   CHECK(records.claim("b"));  // the other process is gone
@@ -167,7 +169,8 @@ TEST_CASE("The last record of an id counts, over all folders", "[cli][batch]") {
   std::string text;
   latest.for_each([&](const LatestRecords::Entry& entry) {
     const Json json = Json::parse(entry.line);
-    text += json["id"].get<std::string>() + ' ' + json["class"].get<std::string>() + ' ' + std::to_string(entry.folder) + '\n';
+    text += json["id"].get<std::string>() + ' ' + json["class"].get<std::string>() + ' ' +
+            std::to_string(entry.folder) + '\n';
   });
   CHECK(text == "a valid 1\nb valid 0\nc rejected 1\n");
 }
@@ -182,7 +185,8 @@ TEST_CASE("A plan leaves out what was done with the same input, options and vers
   const std::string hash = hasher.hash(manifest.models[0]).hash;
   std::vector<std::string> lines;
   for (const BatchModel& model : manifest.models)
-    if (model.id != "new") lines.push_back(line_of(model, model.id == "failed" ? Outcome::crash : Outcome::valid, hash));
+    if (model.id != "new")
+      lines.push_back(line_of(model, model.id == "failed" ? Outcome::crash : Outcome::valid, hash));
   lines[1] = line_of(manifest.models[1], Outcome::valid, "abc");
   BatchModel other = manifest.models[2];
   other.options = {"--quiet"};

@@ -80,8 +80,7 @@ Corners shaken(CellKind kind, double amplitude, std::mt19937_64& engine) {
 
 bool has_positive_corners(CellKind kind, const Corners& x) {
   const Corners reference = reference_corners(kind);
-  return std::all_of(reference.begin(), reference.end(),
-                     [&](const Vec3& p) { return determinant_at(kind, x, p) > 0; });
+  return std::all_of(reference.begin(), reference.end(), [&](const Vec3& p) { return determinant_at(kind, x, p) > 0; });
 }
 
 /// Cells of one kind, no vertex shared.
@@ -136,8 +135,8 @@ TEST_CASE("the certificate never passes an inverted hex with positive corners", 
     invalid += result.validity == CellValidity::invalid;
     undecided += result.validity == CellValidity::undecided;
     false_valid += result.validity == CellValidity::valid && sampled <= 0;
-    false_invalid += result.validity == CellValidity::invalid &&
-                     !(determinant_at(CellKind::hex, cells[c], result.witness) < 1e-14);
+    false_invalid +=
+        result.validity == CellValidity::invalid && !(determinant_at(CellKind::hex, cells[c], result.witness) < 1e-14);
     hidden += result.validity == CellValidity::invalid && sampled > 0;
     bad_bound += result.validity == CellValidity::valid && !(result.lower_bound > 0 && result.lower_bound <= sampled);
   }

@@ -18,7 +18,8 @@ namespace {
 class Twin {
  public:
   Twin(const HighOrderMesh& mesh, std::size_t c)
-      : mesh_(mesh), c_(c),
+      : mesh_(mesh),
+        c_(c),
         shapes_(mesh.space.kind(c), mesh.space.basis(), mesh.space.pattern_order(mesh.space.pattern(c))) {}
 
   double determinant(const Vec3& point) {
@@ -80,8 +81,7 @@ HighOrderMesh curved(const VolumeMesh& straight, Basis basis, int order, double 
       if (node < space.num_vertices()) continue;
       const LocalMode& m = space.modes(c)[a];
       for (int d = 0; d < 3; ++d)
-        mesh.coefficients[node][d] =
-            amplitude * normal(source.random()) / (1.0 + m.i * m.i + m.j * m.j + m.k * m.k);
+        mesh.coefficients[node][d] = amplitude * normal(source.random()) / (1.0 + m.i * m.i + m.j * m.j + m.k * m.k);
     }
   return mesh;
 }
@@ -133,8 +133,9 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
             CHECK(result.lower_bound <= twin.minimum(order > 8 ? 6 : 10));
           }
           if (result.validity == CellValidity::invalid) CHECK(twin.determinant(result.witness) < 0);
-          ++(result.validity == CellValidity::valid ? valid
-             : result.validity == CellValidity::invalid ? invalid : undecided);
+          ++(result.validity == CellValidity::valid     ? valid
+             : result.validity == CellValidity::invalid ? invalid
+                                                        : undecided);
           CHECK(result.validity != CellValidity::undecided);
         }
   CAPTURE(valid, invalid, undecided);

@@ -28,7 +28,7 @@ Line kernels_at(Basis basis, double x) {
   return line;
 }
 
-constexpr double kStep = 1e-5;         // central differences: step^2 times the third derivative of mode 15
+constexpr double kStep = 1e-5;  // central differences: step^2 times the third derivative of mode 15
 constexpr double kDifference = 1e-4;
 
 /// Every mode of a kind at an order, with all variants of its triangle faces.
@@ -43,14 +43,12 @@ std::vector<LocalMode> all_modes(CellKind kind, int order) {
   for (int f = 0; f < topology.num_faces; ++f) {
     const auto& face = topology.faces[f];
     if (topology.face_sizes[f] == 4)
-      for_each_mode(EntityShape::quad, order, [&](ModeIndex m) {
-        modes.push_back(quad_mode(kind, face[0], face[1], face[3], m.i, m.j).mode);
-      });
+      for_each_mode(EntityShape::quad, order,
+                    [&](ModeIndex m) { modes.push_back(quad_mode(kind, face[0], face[1], face[3], m.i, m.j).mode); });
     else
       for (int apex = 0; apex < 3; ++apex)
         for_each_mode(EntityShape::triangle, order, [&](ModeIndex m) {
-          modes.push_back(
-              triangle_mode(kind, face[(apex + 1) % 3], face[(apex + 2) % 3], face[apex], m.i, m.j).mode);
+          modes.push_back(triangle_mode(kind, face[(apex + 1) % 3], face[(apex + 2) % 3], face[apex], m.i, m.j).mode);
         });
   }
   for_each_mode(entity_shape(kind), order, [&](ModeIndex m) { modes.push_back(cell_mode(kind, m)); });
@@ -72,8 +70,7 @@ TEST_CASE("modes of a line have their closed forms, vanish at the ends and have 
         CHECK(there.values[i + 1] == Approx(mode_parity(i) * here.values[i + 1]).margin(1e-15));
         CHECK(there.derivatives[i + 1] == Approx(-mode_parity(i) * here.derivatives[i + 1]).margin(1e-13));
         if (basis == Basis::fourier)
-          CHECK(here.values[i + 1] ==
-                Approx(std::sqrt(2.0) * std::sin(i * M_PI * x) / (i * M_PI)).margin(1e-15));
+          CHECK(here.values[i + 1] == Approx(std::sqrt(2.0) * std::sin(i * M_PI * x) / (i * M_PI)).margin(1e-15));
       }
     }
   }
@@ -105,8 +102,7 @@ TEST_CASE("derivatives of line modes and kernels are differences in the limit", 
       const Line kernel = kernels_at(basis, x);
       const Line kernel_above = kernels_at(basis, x + kStep), kernel_below = kernels_at(basis, x - kStep);
       for (int i = 0; i <= kMaxOrder; ++i)
-        CHECK((above.values[i] - below.values[i]) / (2 * kStep) ==
-              Approx(line.derivatives[i]).margin(kDifference));
+        CHECK((above.values[i] - below.values[i]) / (2 * kStep) == Approx(line.derivatives[i]).margin(kDifference));
       for (int i = 0; i + 1 < kMaxOrder; ++i) {
         const double scale = std::max(1.0, std::abs(kernel.derivatives[i]));
         CHECK((kernel_above.values[i] - kernel_below.values[i]) / (2 * kStep) / scale ==

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/elements/element_space.h"
+#include "subvol/base/error.h"
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/elements/map_projection.h"
 #include "tests/support/element_fixtures.h"
@@ -61,7 +61,8 @@ double jump(const HighOrderMesh& mesh, CellKind first, const Entity& on_first, C
   double largest = 0;
   for (const auto& [s, t] : {std::pair{0.13, 0.29}, std::pair{0.55, 0.08}, std::pair{0.31, 0.62}})
     largest = std::max(largest, (mesh.position(0, point_on(first, on_first, s, t)) -
-                                 mesh.position(1, point_on(second, on_second, s, t))).norm());
+                                 mesh.position(1, point_on(second, on_second, s, t)))
+                                    .norm());
   return largest;
 }
 
@@ -113,8 +114,7 @@ TEST_CASE("node counts of one cell have their closed forms", "[elements]") {
     CHECK(ElementSpace(single_cell(CellKind::hex), Basis::fourier, p).num_nodes() == (p + 1.0) * (p + 1) * (p + 1));
     CHECK(ElementSpace(single_cell(CellKind::prism), Basis::fourier, p).num_nodes() ==
           (p + 1.0) * (p + 1) * (p + 2) / 2);
-    CHECK(ElementSpace(single_cell(CellKind::tet), Basis::fourier, p).num_nodes() ==
-          (p + 1.0) * (p + 2) * (p + 3) / 6);
+    CHECK(ElementSpace(single_cell(CellKind::tet), Basis::fourier, p).num_nodes() == (p + 1.0) * (p + 2) * (p + 3) / 6);
     CHECK(ElementSpace(lattice(2, 3, 1), Basis::fourier, p).num_nodes() == (2.0 * p + 1) * (3 * p + 1) * (p + 1));
   }
 }
@@ -198,8 +198,8 @@ TEST_CASE("affine maps are reproduced at every order, kind and basis", "[element
       VolumeMesh moved = mesh;
       for (Vec3& p : moved.positions) p = affine(p);
       CHECK(largest_error(HighOrderMesh(straight.space, moved), straight, affine) < 1e-13);
-      const HighOrderMesh projected = project_map(
-          straight.space, [&](std::size_t c, const Vec3& p) { return affine(straight.position(c, p)); });
+      const HighOrderMesh projected =
+          project_map(straight.space, [&](std::size_t c, const Vec3& p) { return affine(straight.position(c, p)); });
       CHECK(largest_error(projected, straight, affine) < 1e-12);
       for (std::size_t c = 0; c < 4; ++c) {
         const Vec3 p(0.2, 0.3, 0.4);

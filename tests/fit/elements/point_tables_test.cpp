@@ -71,8 +71,8 @@ void compare(const ElementSpace& space, std::span<const CellPoint> points, Point
 TEST_CASE("tables of points are the map to them", "[elements]") {
   PointSource source(51);
   for (const Basis basis : kBothBases)
-    for (const VolumeMesh& plain : {single_cell(CellKind::tet), single_cell(CellKind::prism), lattice(2, 2, 1),
-                                    mixed_cells()}) {
+    for (const VolumeMesh& plain :
+         {single_cell(CellKind::tet), single_cell(CellKind::prism), lattice(2, 2, 1), mixed_cells()}) {
       const VolumeMesh mesh = renumbered(plain, source.random());
       for (const int intervals : {1, 5, 12}) {
         const ElementSpace uniform(mesh, basis, 5), mixed(mesh, basis, mixed_orders(mesh, source.random()));

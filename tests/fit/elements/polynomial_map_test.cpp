@@ -110,6 +110,6 @@ TEST_CASE("lagrange_cells: cells that are cut short are refused", "[export]") {
   std::vector<Index> nodes = hex.cell_vertices;
   nodes[3] = 8;
   CHECK_THROWS_AS(polynomials_of({hex.positions, hex.kinds, {}, offsets, nodes, {}}, NodeOrdering::vtk), InputError);
-  CHECK_THROWS_AS(
-      polynomials_of({hex.positions, hex.kinds, {}, offsets, hex.cell_vertices, {}}, NodeOrdering::rows), InputError);
+  CHECK_THROWS_AS(polynomials_of({hex.positions, hex.kinds, {}, offsets, hex.cell_vertices, {}}, NodeOrdering::rows),
+                  InputError);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/elements/quadrature.h"
+#include "subvol/base/error.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -18,8 +18,7 @@ double factorial(int n) { return n < 2 ? 1 : n * factorial(n - 1); }
 /// Mean of u^a v^b w^c over a canonical cell.
 double exact_mean(CellKind kind, int a, int b, int c) {
   if (kind == CellKind::hex) return 1.0 / ((a + 1) * (b + 1) * (c + 1));
-  if (kind == CellKind::tet)
-    return 6 * factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 3);
+  if (kind == CellKind::tet) return 6 * factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 3);
   return 2 * factorial(a) * factorial(b) / factorial(a + b + 2) / (c + 1);
 }
 

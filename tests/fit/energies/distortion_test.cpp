@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The distortions that can be chosen by name, at one Jacobian and over cells of all kinds and orders.
 
+#include "subvol/fit/energies/distortion.h"
 #include "samples/shapes.h"
 #include "subvol/fit/elements/element_rule.h"
-#include "subvol/fit/energies/distortion.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/energies/volume_energy.h"
 #include "subvol/fit/high_order_fit.h"
@@ -157,8 +157,8 @@ TEST_CASE("Singular vectors and stress are as accurate as the Jacobian, be singu
         .normalized()
         .toRotationMatrix();
   };
-  const Vec3 values[] = {{1, 1, 1},       {2, 2, 1},       {2, 1, 1},          {3, 2, 1},
-                         {1, 1e-3, 1e-6}, {1, 1, 1e-7},    {1e4, 1, 1},        {1, 1 + 1e-9, 1 + 2e-9},
+  const Vec3 values[] = {{1, 1, 1},         {2, 2, 1},       {2, 1, 1},          {3, 2, 1},
+                         {1, 1e-3, 1e-6},   {1, 1, 1e-7},    {1e4, 1, 1},        {1, 1 + 1e-9, 1 + 2e-9},
                          {5, 5, 5 + 1e-12}, {7e5, 8e5, 9e5}, {1e-5, 2e-5, 4e-5}, {1, 2, 2 + 1e-8}};
   for (const Vec3& s : values)
     for (int k = 0; k < 100; ++k) {

@@ -188,7 +188,8 @@ TEST_CASE(
       check_derivatives(energy, x, d, 1e-6, 1e-6);
     }
   const VolumeMesh mesh = ideal_cell(CellKind::hex);
-  CHECK_THROWS(VolumeEnergy(mesh, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, 2));
+  CHECK_THROWS(VolumeEnergy(
+      mesh, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, 2));
 }
 
 TEST_CASE("A step of the size that max_step allows stays feasible, a longer one may not") {

@@ -156,7 +156,7 @@ TEST_CASE("In the form of other distortions, the regularized barrier has the sam
     for (int k = 0; k < 9; ++k)
       for (int l = 0; l < kSimdLanes; ++l) batch.jacobian[k][l] = j(k / 3, k % 3);
     regularized_hessian(&batch, 1, epsilon);
-    const auto matrix_of = [&](const double (*entries)[kSimdLanes]) {
+    const auto matrix_of = [&](const double(*entries)[kSimdLanes]) {
       Mat3 m;
       for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = entries[k][3];
       return m;

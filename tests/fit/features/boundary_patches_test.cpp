@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/features/boundary_patches.h"
+#include "subvol/base/error.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "tests/support/feature_fixtures.h"

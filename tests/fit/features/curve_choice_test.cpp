@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/features/curve_choice.h"
+#include "subvol/base/error.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "tests/support/feature_fixtures.h"
 

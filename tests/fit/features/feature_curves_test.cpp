@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/features/feature_curves.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/crease_paths.h"
-#include "subvol/fit/features/feature_curves.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
 
@@ -114,8 +114,8 @@ TEST_CASE("each of many cubes gets its paths, whatever its vertices' numbers") {
   constexpr int kCubes = 2;
   const auto in_cube = [](int i) { return i % 4 < 2; };
   constexpr int kLength = 4 * kCubes - 2;
-  VolumeMesh mesh = voxels(kLength, kLength, kLength,
-                           [&](int i, int j, int k) { return in_cube(i) && in_cube(j) && in_cube(k); });
+  VolumeMesh mesh =
+      voxels(kLength, kLength, kLength, [&](int i, int j, int k) { return in_cube(i) && in_cube(j) && in_cube(k); });
   for (Vec3& p : mesh.positions) p += Vec3(0.15, -0.1, 0.12);
   TriangleMesh target;
   for (int n = 0; n < kCubes * kCubes * kCubes; ++n) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/features/pads.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/feature_routing.h"
-#include "subvol/fit/features/pads.h"
 #include "subvol/fit/features/quality_caps.h"
 #include "subvol/mesh/validate.h"
 #include "tests/support/feature_fixtures.h"

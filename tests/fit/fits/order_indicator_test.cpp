@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/fits/order_indicator.h"
 #include "samples/shapes.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/high_order_energy.h"
-#include "subvol/fit/fits/order_indicator.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/sample_meshes.h"
 

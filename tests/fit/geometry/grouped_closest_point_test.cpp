@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include "subvol/base/error.h"
 #include "tests/support/surface_fixtures.h"

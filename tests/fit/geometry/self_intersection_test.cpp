@@ -52,7 +52,7 @@ TEST_CASE("surfaces that cross or touch are found with their triangles", "[self_
 }
 
 TEST_CASE("neighbors intersect only when folded or crossing beyond what they share", "[self_intersection]") {
-  const std::vector<Vec3> flat = {{0, 0, 0},    {1, 0, 0},     {0, 1, 0},      {0.5, 0.5, 0},
+  const std::vector<Vec3> flat = {{0, 0, 0},    {1, 0, 0},     {0, 1, 0},     {0.5, 0.5, 0},
                                   {0.5, -1, 0}, {0.3, 0.3, 1}, {0.3, 0.2, -1}};
   const auto pairs = [&](Index a, Index b, Index c) {
     return self_intersections({flat, {{0, 1, 2}, {a, b, c}}}).pairs.size();

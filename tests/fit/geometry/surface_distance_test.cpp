@@ -22,8 +22,8 @@ TriangleMesh sphere(double radius, int n) {
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j < n; ++j) {
       const double polar = pi * i / n, azimuth = 2 * pi * j / n;
-      mesh.positions.push_back(radius * Vec3(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
-                                             std::cos(polar)));
+      mesh.positions.push_back(
+          radius * Vec3(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)));
     }
   for (Index i = 0; i < n; ++i)
     for (Index j = 0; j < n; ++j) {

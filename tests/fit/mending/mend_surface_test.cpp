@@ -208,9 +208,9 @@ TEST_CASE("What crosses deeply stays, and is told with its number and places", "
   for (const auto& [a, b, c] : one.triangles) two.triangles.push_back({n + a, n + b, n + c});
   const PolygonMesh given = as_polygons(two);
   CHECK_FALSE(find_faults(mend_surface(given, {}, 1e-3).surface).none());
-  CHECK_THROWS_WITH(make_shell(given, {.thickness = 0.05}),
-                    Catch::Contains("the surface meets itself at ") && Catch::Contains(" pairs of faces: faces ") &&
-                        Catch::Contains(" in all)"));
+  CHECK_THROWS_WITH(make_shell(given, {.thickness = 0.05}), Catch::Contains("the surface meets itself at ") &&
+                                                                Catch::Contains(" pairs of faces: faces ") &&
+                                                                Catch::Contains(" in all)"));
 }
 
 TEST_CASE("Messages name vertices by the numbers that the caller gives, and their coordinates", "[mending]") {

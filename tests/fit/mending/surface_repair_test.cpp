@@ -155,9 +155,8 @@ TEST_CASE("A hole is covered also if a crossing elsewhere is left", "[mending][s
   const SurfaceRepair repair = repair_surface(cube);
   CHECK_FALSE(repair.is_fillable);
   CHECK_FALSE(diagnose(repair.surface).find(SurfaceFault::open_rim));
-  CHECK(std::ranges::any_of(repair.done, [](const std::string& done) {
-    return done.find("target: 1 hole is covered") == 0;
-  }));
+  CHECK(std::ranges::any_of(repair.done,
+                            [](const std::string& done) { return done.find("target: 1 hole is covered") == 0; }));
 }
 
 TEST_CASE("Closed parts that lie on each other and have edges in common are united", "[mending]") {

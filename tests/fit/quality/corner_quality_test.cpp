@@ -60,7 +60,6 @@ TEST_CASE("The corner scaled Jacobian of a hex is that of its worst corner", "[q
 
 TEST_CASE("The corner scaled Jacobian of a right prism is the sine of its least angle over that of 60 degrees",
           "[quality]") {
-  const VolumeMesh prism =
-      cell(CellKind::prism, {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 0, 1}, {0, 1, 1}});
+  const VolumeMesh prism = cell(CellKind::prism, {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 0, 1}, {0, 1, 1}});
   CHECK(measure_corner_quality(prism).min_scaled_jacobian == Approx(1 / std::sqrt(5.0) * 2 / std::sqrt(3.0)));
 }

@@ -37,10 +37,8 @@ VolumeMesh ideal_prism(double height) {
 }
 
 VolumeMesh ideal_tet() {
-  return one_cell(CellKind::tet, {{0, 0, 0},
-                                  {1, 0, 0},
-                                  {0.5, std::sqrt(3.0) / 2, 0},
-                                  {0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3}});
+  return one_cell(CellKind::tet,
+                  {{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(3.0) / 2, 0}, {0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3}});
 }
 
 VolumeMesh ideal_pyramid() {

@@ -64,9 +64,16 @@ void check_that_it_resumes(const Run& run) {
 }
 
 SolvedStage small_stage() {
-  return {"level 1, lambda 0.5", 77, {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300)},
-          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}},
-           {Vec3(1, 2, 4), Vec3(0, 0, 7)}, 1}, 0.5};
+  return {"level 1, lambda 0.5",
+          77,
+          {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300)},
+          {MinimizerStop::no_step,
+           "no step",
+           {{1.5, 0.25, 1, 12, 3}},
+           {{4, 5}, {}, {4}},
+           {Vec3(1, 2, 4), Vec3(0, 0, 7)},
+           1},
+          0.5};
 }
 
 }  // namespace

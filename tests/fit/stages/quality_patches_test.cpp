@@ -42,8 +42,8 @@ TEST_CASE("Patches hold the cells around their centers, and share none", "[quali
   SECTION("one at each end") {
     const auto patches = quality_patches(bar, problem, {}, std::vector<Index>{0, last}, 1, bar.num_cells());
     REQUIRE(patches.size() == 2);
-    CHECK(patches[0].unknowns.size() == 27);     // the vertices of 2 x 2 x 2 cells
-    CHECK(patches[0].cells.size() == 27);        // the cells at these
+    CHECK(patches[0].unknowns.size() == 27);  // the vertices of 2 x 2 x 2 cells
+    CHECK(patches[0].cells.size() == 27);     // the cells at these
     CHECK(patches[0].vertices.size() == 64);
     CHECK(patches[1].cells.size() == 27);
     CHECK(std::ranges::find_first_of(patches[0].cells, patches[1].cells) == patches[0].cells.end());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/stages/staged_fit.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/stage_runner.h"
-#include "subvol/fit/stages/staged_fit.h"
 
 #include <catch2/catch.hpp>
 
@@ -85,7 +85,8 @@ TEST_CASE("a folded boundary is unfolded by the least lambda that does it, each 
   CHECK(fit.num_states() == 1);  // the start, from which the stage that was kept went
 }
 
-TEST_CASE("what leaves more than half of the pairs is undone; what leaves fewer is kept and stiffened", "[staged_fit]") {
+TEST_CASE("what leaves more than half of the pairs is undone; what leaves fewer is kept and stiffened",
+          "[staged_fit]") {
   FoldedFit slow([](double lambda) -> std::size_t { return lambda < 0.02 ? 6 : 4; });
   CHECK(slow.unfold(1));
   CHECK(slow.x() == 0.01);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/target/fit_target.h"
 #include "subvol/fit/target/target_surface.h"
+#include "subvol/fit/target/fit_target.h"
 
 #include "samples/shapes.h"
 #include "subvol/base/error.h"

@@ -36,8 +36,10 @@ TEST_CASE("file_formats: every format that is said to be read has a reader, and 
     const auto path = folder.file("a" + std::string(format.extension), "nothing");
     std::string said;
     try {
-      if (format.holds_cells) read_cells(path);
-      else read_polygon_mesh(path);
+      if (format.holds_cells)
+        read_cells(path);
+      else
+        read_polygon_mesh(path);
     } catch (const InputError& error) {
       said = error.what();
     }

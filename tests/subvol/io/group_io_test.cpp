@@ -56,8 +56,9 @@ TEST_CASE("groups of an .obj are named by g, else by materials, else by several 
 
 TEST_CASE("dropped faces take their groups along") {
   const TemporaryFolder folder;
-  const auto file = folder.file("a.obj", kCorners + "g a\nf 1 3 2\ng b\nf 1 1 2\ng c\nf 1 2 4\ng d\nf 2 4 1\n"
-                                                    "g e\nf 2 3 4\n");
+  const auto file = folder.file("a.obj", kCorners +
+                                             "g a\nf 1 3 2\ng b\nf 1 1 2\ng c\nf 1 2 4\ng d\nf 2 4 1\n"
+                                             "g e\nf 2 3 4\n");
   CHECK(labels(read_polygon_mesh(file).face_groups) == Labels{"a", "c", "d", "e"});
   CHECK(labels(read_triangle_mesh(file).face_groups) == Labels{"a", "c", "e"});
 }
@@ -77,8 +78,9 @@ TEST_CASE("several solids of an .stl are groups, one is none") {
 TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
   const auto ply = [](const std::string& properties, const std::array<std::string, 2>& values) {
     return "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-           "element face 2\nproperty list uchar int vertex_indices\n" + properties +
-           "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 " + values[0] + "\n3 0 1 3 " + values[1] + "\n";
+           "element face 2\nproperty list uchar int vertex_indices\n" +
+           properties + "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 " + values[0] + "\n3 0 1 3 " + values[1] +
+           "\n";
   };
   const std::string material = "property int flags\nproperty int material_id\n";
   const FaceGroups numbered = read_groups("a.ply", ply(material, {"1 9", "1 4"})).face_groups;

@@ -4,8 +4,8 @@
 #include "subvol/base/error.h"
 #include "tests/support/temporary_folder.h"
 
-#include <catch2/catch.hpp>
 #include <zlib.h>
+#include <catch2/catch.hpp>
 
 #include <cstring>
 #include <numeric>
@@ -30,8 +30,8 @@ std::string gzipped(const std::string& bytes) {
 }
 
 std::string npy(const std::string& type, bool fortran, const std::string& shape, const std::string& data) {
-  std::string header = "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") +
-                       ", 'shape': (" + shape + "), }";
+  std::string header =
+      "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") + ", 'shape': (" + shape + "), }";
   header.resize(118, ' ');
   header.back() = '\n';
   return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(header.size()) + '\0' + header + data;
@@ -67,9 +67,9 @@ TEST_CASE("Segmentations are read from NumPy arrays of both orders", "[io]") {
   const test::TemporaryFolder files;
   const LabelGrid c = read_label_grid(files.file("c.npy", npy("|u1", false, "2, 3, 4", counted())));
   CHECK(c.counts == std::array<int, 3>{2, 3, 4});
-  CHECK(c.labels[1] == 12);       // [1, 0, 0]
-  CHECK(c.labels[2] == 4);        // [0, 1, 0]
-  CHECK(c.labels[2 * 3] == 1);    // [0, 0, 1]
+  CHECK(c.labels[1] == 12);     // [1, 0, 0]
+  CHECK(c.labels[2] == 4);      // [0, 1, 0]
+  CHECK(c.labels[2 * 3] == 1);  // [0, 0, 1]
   const LabelGrid f = read_label_grid(files.file("f.npy", npy("|u1", true, "2, 3, 4", counted())));
   for (int i = 0; i < 24; ++i) CHECK(f.labels[static_cast<std::size_t>(i)] == i);
   std::string big;
@@ -96,8 +96,8 @@ TEST_CASE("Segmentations are read from NRRD and NIfTI with the place of their vo
   const LabelGrid text = read_label_grid(files.file("t.nrrd", header + "encoding: ascii\nspacings: 1 2 3\n\n" + words));
   CHECK(text.labels[23] == 23);
   CHECK(text.edges(2, 2) == 3);
-  for (const LabelGrid& grid : {read_label_grid(files.file("n.nii", nifti())),
-                                read_label_grid(files.file("n.nii.gz", gzipped(nifti())))}) {
+  for (const LabelGrid& grid :
+       {read_label_grid(files.file("n.nii", nifti())), read_label_grid(files.file("n.nii.gz", gzipped(nifti())))}) {
     CHECK(grid.counts == std::array<int, 3>{2, 3, 4});
     CHECK(grid.edges(1, 1) == 1.5);
     CHECK(grid.labels[23] == 23);

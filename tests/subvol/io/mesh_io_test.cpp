@@ -22,7 +22,8 @@ namespace {
 /// A unit cube as Medit text, with `body` in place of its cells.
 std::string cube_file(const std::string& body) {
   return "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n"
-         "1 1 1 0\n0 1 1 0\n" + body;
+         "1 1 1 0\n0 1 1 0\n" +
+         body;
 }
 const std::string kCubeCell = "Hexahedra\n1\n1 2 3 4 5 6 7 8 0\n";
 
@@ -216,8 +217,9 @@ TEST_CASE("a mesh without extent is refused, checked or not") {
   const TemporaryFolder folder;
   for (const bool check : {true, false})
     CHECK_THROWS_WITH(
-        read_volume_mesh(folder.file("in.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n1 2 3 0\n1 2 3 0\n"
-                                                "1 2 3 0\n1 2 3 0\n0 0 0 0\nTetrahedra\n1\n1 2 3 4 0\nEnd\n"),
+        read_volume_mesh(folder.file("in.mesh",
+                                     "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n1 2 3 0\n1 2 3 0\n"
+                                     "1 2 3 0\n1 2 3 0\n0 0 0 0\nTetrahedra\n1\n1 2 3 4 0\nEnd\n"),
                          {.check = check}),
         Contains("in one place"));
 }

@@ -73,8 +73,8 @@ std::string vtk_file(const Style& style, const std::vector<double>& coordinates,
   return out + "CELL_TYPES " + std::to_string(types.size()) + "\n" + array_of(types, style.binary);
 }
 
-const std::vector<double> kPoints = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1,
-                                     2, 0.5, 0, 2, 0.5, 1, 1.5, 0.5, 2};
+const std::vector<double> kPoints = {0, 0, 0, 1, 0, 0, 1, 1, 0,   0, 1, 0,   0, 0,   1,   1, 0,
+                                     1, 1, 1, 1, 0, 1, 1, 2, 0.5, 0, 2, 0.5, 1, 1.5, 0.5, 2};
 // In VTK's numbering: the normal of the wedge's first triangle points away from the second.
 const std::vector<std::vector<std::int32_t>> kCells = {
     {0, 1, 2, 3, 4, 5, 6, 7}, {1, 2, 8, 5, 6, 9}, {5, 9, 6, 10}, {0, 3, 2, 1}, {4}};
@@ -113,8 +113,7 @@ TEST_CASE("every flavour of legacy VTK gives the same mesh, cells right-handed a
   CHECK_THAT(warnings[0], Contains("2 cells of lower dimension"));
   CHECK(validate(mesh).empty());
   CHECK(mesh.kinds == std::vector<CellKind>{CellKind::hex, CellKind::prism, CellKind::tet});
-  CHECK(mesh.cell_vertices ==
-        std::vector<Index>{0, 1, 2, 3, 4, 5, 6, 7, 1, 8, 2, 5, 9, 6, 5, 9, 6, 10});
+  CHECK(mesh.cell_vertices == std::vector<Index>{0, 1, 2, 3, 4, 5, 6, 7, 1, 8, 2, 5, 9, 6, 5, 9, 6, 10});
   for (std::size_t i = 0; i < kPoints.size(); ++i) CHECK(mesh.positions[i / 3][static_cast<int>(i % 3)] == kPoints[i]);
 }
 
@@ -143,13 +142,12 @@ TEST_CASE("whole-number cell data become references, in whatever form they come"
   const std::string values = array_of(std::vector<std::int32_t>{5, 6, 7, 8, 9}, binary);
   const std::string floats = array_of(std::vector<float>(5, 0.5f), binary);
   const std::string others = array_of(std::vector<float>(11, std::numeric_limits<float>::quiet_NaN()), binary);
-  const std::string after =
-      GENERATE_COPY("CELL_DATA 5\nSCALARS part int 1\nLOOKUP_TABLE default\n" + values,
-                    "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others +
-                        "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" + floats +
-                        "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
-                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\n" +
-                        array_of(std::vector<float>(15, 0.5f), binary));
+  const std::string after = GENERATE_COPY("CELL_DATA 5\nSCALARS part int 1\nLOOKUP_TABLE default\n" + values,
+                                          "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others +
+                                              "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" + floats +
+                                              "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
+                                          "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values +
+                                              "VECTORS v float\n" + array_of(std::vector<float>(15, 0.5f), binary));
   CHECK(read_bytes(base + after).references == std::vector<int>{5, 6, 7});
 }
 
@@ -159,8 +157,7 @@ TEST_CASE("references come from the cell data that are meant, and from those tha
     return name + " 1 5 int\n" + array_of(std::vector<std::int32_t>{first, first + 1, first + 2, 8, 9}, binary);
   };
   const auto reals = [&](const std::string& name, double first, double step) {
-    return name + " 1 5 double\n" +
-           array_of(std::vector<double>{first, first + step, first + 2 * step, 8, 9}, binary);
+    return name + " 1 5 double\n" + array_of(std::vector<double>{first, first + step, first + 2 * step, 8, 9}, binary);
   };
   const auto read = [&](const std::vector<std::string>& arrays, const std::string& name = "",
                         std::vector<std::string>* warnings = nullptr) {
@@ -185,9 +182,9 @@ TEST_CASE("references come from the cell data that are meant, and from those tha
     CHECK(read({ints("first", 40), ints(known, 5)}) == wanted);
   }
   CHECK(read({ints("gmsh:geometrical", 40), ints("gmsh:physical", 5)}) == wanted);
-  CHECK(read({reals("pressure", 5, 1)}).empty());              // nobody knows that it is none
+  CHECK(read({reals("pressure", 5, 1)}).empty());  // nobody knows that it is none
   CHECK(read({reals("pressure", 5, 1)}, "pressure") == wanted);
-  CHECK(read({reals("MaterialIds", 5, 0.5)}).empty());         // 5.5 is no reference
+  CHECK(read({reals("MaterialIds", 5, 0.5)}).empty());  // 5.5 is no reference
   CHECK(read({ints("Region%20Id", 5)}, "region id") == wanted);
   std::vector<std::string> warnings;
   read({ints("color", 5), ints("shade", 40)}, "", &warnings);
@@ -223,7 +220,7 @@ TEST_CASE("attributes that cannot be passed over end the reading of a VTK file, 
   const std::string base = vtk_file({}, kPoints, kCells, kTypes);
   const std::string part = "SCALARS part int\nLOOKUP_TABLE default\n5 6 7 8 9\n";
   for (const std::string attribute : {"NEW_KIND v int\n1 2 3 4 5\n", "VECTORS v of\n", "SCALARS v bit\n1 0 1 0 1\n",
-                                       "FIELD f 1\nv 1 5 bit\n1 0 1 0 1\n"}) {
+                                      "FIELD f 1\nv 1 5 bit\n1 0 1 0 1\n"}) {
     CAPTURE(attribute);
     std::vector<std::string> warnings;
     CHECK(read_bytes(base + "CELL_DATA 5\n" + attribute + part, &warnings).references.empty());

@@ -2,8 +2,8 @@
 // Surfaces of .vtp, .3mf, .glb, .gltf, .msh and .inp, and the surfaces that we write.
 
 #include "subvol/base/error.h"
-#include "subvol/export/gltf_writer.h"
 #include "subvol/export/export.h"
+#include "subvol/export/gltf_writer.h"
 #include "subvol/export/read_back.h"
 #include "subvol/export/surface_writer.h"
 #include "subvol/io/mesh_io.h"

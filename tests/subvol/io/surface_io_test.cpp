@@ -120,8 +120,9 @@ TEST_CASE("OFF is read with comments, colors, normals and counts of every kind")
   check_tet(read_triangles("a.OFF", replaced(kTetOff, "OFF\n4 4 6", "OFF # c\n\n# c\n4 4")));
   check_tet(read_triangles("a.off", replaced(kTetOff, "OFF\n4 4 6", "OFF 4 4 6")));
   check_tet(read_triangles("a.off", replaced(kTetOff, "3 0 2 1\n", "3  0\t2 1 255 0 0 # red\r\n")));
-  check_tet(read_triangles("a.off", "COFF\n4 4 0\n0 0 0 255 0 0 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0\n0 0 1 .5 .5 .5\n"
-                                    "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"));
+  check_tet(read_triangles("a.off",
+                           "COFF\n4 4 0\n0 0 0 255 0 0 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0\n0 0 1 .5 .5 .5\n"
+                           "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"));
 }
 
 TEST_CASE("OBJ is read with negative numbers, textures, forward references and long lines") {
@@ -223,8 +224,12 @@ TEST_CASE("text in UTF-16 is named as such by every reader") {
   const std::string long_stl = text_stl() + text_stl() + text_stl();
   for (const bool big_endian : {false, true})
     for (const bool mark : {false, true})
-      for (const auto& [name, text] : {std::pair("a.off", kTetOff), {"a.obj", "v 0 0 0\n"}, {"a.stl", text_stl()},
-                                       {"a.stl", long_stl}, {"a.stl", "solid"}, {"a.ply", kTextPly}}) {
+      for (const auto& [name, text] : {std::pair("a.off", kTetOff),
+                                       {"a.obj", "v 0 0 0\n"},
+                                       {"a.stl", text_stl()},
+                                       {"a.stl", long_stl},
+                                       {"a.stl", "solid"},
+                                       {"a.ply", kTextPly}}) {
         CAPTURE(name, big_endian, mark);
         CHECK_THAT(surface_refusal(name, wide(text, big_endian, mark)), Contains(name) && Contains("UTF-16"));
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include "tests/support/sample_meshes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/audit.h"
+#include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/mesh/features.h"
 #include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/features.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/subdivision/audit.h"
 #include "subvol/subdivision/limit_surface.h"
@@ -44,7 +44,8 @@ std::vector<VolumeMesh> meshes_of_regions() {
     const auto inside = [](int a) { return a == 1 || a == 2; };
     return inside(i) && inside(j) && inside(k) ? 2 : 1;
   }));
-  meshes.push_back(lattice_of_regions(4, 4, 3, [](int i, int j, int k) { return k == 1 && (i < 2) == (j < 2) ? 5 : 0; }));
+  meshes.push_back(
+      lattice_of_regions(4, 4, 3, [](int i, int j, int k) { return k == 1 && (i < 2) == (j < 2) ? 5 : 0; }));
   meshes.push_back(lattice_of_regions(3, 3, 3, [](int i, int j, int k) { return i == 1 && j == 1 && k == 1 ? 1 : 0; }));
   VolumeMesh mixed = mixed_cells();
   for (std::size_t c = 0; c < mixed.num_cells(); ++c) mixed.references.push_back(static_cast<int>(c % 3));

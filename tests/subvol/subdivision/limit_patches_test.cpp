@@ -13,9 +13,9 @@ using namespace subvol::test;
 
 namespace {
 
-constexpr int kLevels = 4;            // of patches, in the twin
+constexpr int kLevels = 4;                // of patches, in the twin
 constexpr double kPatchRounding = 1e-12;  // of lengths near 1 after a few dozen operations
-constexpr double kDartNormals = 1e-4; // header of limit_masks.h: darts are good to 2e-5
+constexpr double kDartNormals = 1e-4;     // header of limit_masks.h: darts are good to 2e-5
 
 using Place = std::array<int, 2>;
 

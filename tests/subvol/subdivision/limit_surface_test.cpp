@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/subdivision/limit_surface.h"
+#include "subvol/base/error.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/opensubdiv_oracle.h"
 #include "tests/support/sample_meshes.h"
@@ -119,8 +119,7 @@ TEST_CASE("normals are the same before and after refinement, at darts nearly so"
   jitter(mesh, 0.1);
   const auto normals_at_vertices = [&](int levels) {
     const BoundaryRefinement refined = refine_boundary(mesh, levels, true);
-    const std::vector<Vec3> normals =
-        limit_normals(refined, mesh.positions, refined.positions.apply(mesh.positions));
+    const std::vector<Vec3> normals = limit_normals(refined, mesh.positions, refined.positions.apply(mesh.positions));
     std::vector<Vec3> result(refined.vertices.size(), Vec3::Zero());
     for (std::size_t q = 0; q < refined.quads.size(); ++q)
       for (int i = 0; i < 4; ++i)

@@ -57,8 +57,8 @@ double oracle_distance(VolumeMesh mesh, int levels = 2) {
 }
 
 std::vector<VolumeMesh> meshes_to_subdivide() {
-  std::vector<VolumeMesh> meshes = {lattice(1, 1, 1), lattice(3, 2, 2), l_shape(2), fan(4, 270, 2), fan(5, 360 - 20, 1),
-                                    mixed_cells()};
+  std::vector<VolumeMesh> meshes = {lattice(1, 1, 1), lattice(3, 2, 2),    l_shape(2),
+                                    fan(4, 270, 2),   fan(5, 360 - 20, 1), mixed_cells()};
   for (VolumeMesh& mesh : meshes) jitter(mesh, 0.1);
   return meshes;
 }
@@ -273,8 +273,8 @@ TEST_CASE("renumbering the vertices moves the fine mesh by rounding only", "[sub
   const SubdivisionLevel a = subdivide(mesh), b = subdivide(renumbered);
   double distance = 0;  // compared through the cells, whose order is the same
   for (std::size_t i = 0; i < a.fine.cell_vertices.size(); ++i)
-    distance = std::max(distance, (a.fine.positions[a.fine.cell_vertices[i]] -
-                                   b.fine.positions[b.fine.cell_vertices[i]]).norm());
+    distance = std::max(distance,
+                        (a.fine.positions[a.fine.cell_vertices[i]] - b.fine.positions[b.fine.cell_vertices[i]]).norm());
   CHECK(distance <= 1e-14 * 3);
 }
 

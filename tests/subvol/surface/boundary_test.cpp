@@ -71,8 +71,18 @@ TEST_CASE("a dart is cut inside even where the outer diagonal is shorter") {
 
 TEST_CASE("a concave polygon is cut into triangles of its own area") {
   // A comb with three teeth.
-  const PolygonMesh comb = polygon({{0, 0, 0}, {5, 0, 0}, {5, 3, 0}, {4, 3, 0}, {4, 1, 0}, {3, 1, 0}, {3, 3, 0},
-                                    {2, 3, 0}, {2, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}});
+  const PolygonMesh comb = polygon({{0, 0, 0},
+                                    {5, 0, 0},
+                                    {5, 3, 0},
+                                    {4, 3, 0},
+                                    {4, 1, 0},
+                                    {3, 1, 0},
+                                    {3, 3, 0},
+                                    {2, 3, 0},
+                                    {2, 1, 0},
+                                    {1, 1, 0},
+                                    {1, 3, 0},
+                                    {0, 3, 0}});
   const TriangleMesh cut = triangulate(comb);
   REQUIRE(cut.triangles.size() == 10);
   double area = 0;

@@ -97,8 +97,9 @@ TEST_CASE("Solids that share a face, each with its own copy, are two regions", "
   const auto found = find_regions(together(box_surface({0, 0, 0}, {1, 1, 1}), box_surface({1, 0, 0}, {3, 1, 1})));
   REQUIRE(found);
   CHECK(are(found->volumes, {1, 2}));
-  CHECK(std::count_if(found->sides.begin(), found->sides.end(),
-                      [](const auto& sides) { return sides == std::array<int, 2>{1, 2}; }) == 8);
+  CHECK(std::count_if(found->sides.begin(), found->sides.end(), [](const auto& sides) {
+          return sides == std::array<int, 2>{1, 2};
+        }) == 8);
 }
 
 TEST_CASE("Layers of a cylinder and a membrane inside one of them", "[regions]") {

@@ -160,13 +160,11 @@ TEST_CASE("Of many parts, those that lie in an odd number of others are cavities
   for (const Part& part : parts) {
     std::ptrdiff_t depth = std::ssize(parts);  // a part that crosses another does not lie in it
     for (const Vec3& p : part.points)
-      depth = std::min(depth, std::ranges::count_if(parts, [&](const Part& other) {
-        return &other != &part && other.holds(p);
-      }));
+      depth = std::min(
+          depth, std::ranges::count_if(parts, [&](const Part& other) { return &other != &part && other.holds(p); }));
     // One that lies in two others together, but in neither, lies in none.
-    const auto around = std::ranges::any_of(parts, [&](const Part& other) {
-      return &other != &part && other.box.contains(part.box);
-    });
+    const auto around =
+        std::ranges::any_of(parts, [&](const Part& other) { return &other != &part && other.box.contains(part.box); });
     cavities += around && depth % 2 != 0;
   }
   const SolidBoundary solid = solid_boundary(surface);

@@ -158,7 +158,7 @@ TEST_CASE("Splitting a sheet and collapsing a part of it are inverse", "[templat
   CHECK_THROWS_AS(split_sheet(lattice, a, 10000), InputError);
   CHECK_THROWS_AS(split_sheet(lattice, a, b, 1), InputError);
   const VolumeMesh mixed = test::mixed_cells();
-  CHECK_THROWS_AS(split_sheet(mixed, 0, 3), InputError);   // runs into triangles of a prism
+  CHECK_THROWS_AS(split_sheet(mixed, 0, 3), InputError);  // runs into triangles of a prism
   check_mesh_is(split_sheet(mixed, 0, 4), 1, volume_of(mixed));
   CHECK(split_sheet(mixed, 0, 4).num_cells() == mixed.num_cells() + 3);
 }

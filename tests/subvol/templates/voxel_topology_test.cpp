@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/voxel_topology.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/templates/voxel_evolution.h"
 #include "subvol/templates/voxel_grid.h"
-#include "subvol/templates/voxel_topology.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
