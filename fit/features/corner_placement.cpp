@@ -12,7 +12,7 @@ namespace subvol::internal {
 
 namespace {
 
-// Found on twelve CAD parts, like the constants of feature_routing.cpp. Lengths are in units of h.
+// Found on twelve CAD parts. Lengths are in units of h.
 /// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
 constexpr double kCornerReach = 1.6;
 /// Costs of a corner's vertex: for each curve without an edge of the wanted number of cells; if edges are missing.
