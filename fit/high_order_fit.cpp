@@ -62,7 +62,23 @@ class HighOrderFit : HighOrderDriver {
   void keep_curved_interfaces();
   template <class Work>
   HighOrderFitResult concluded(const Work& work);
+  /// Where an attempt at the first orders has led.
+  struct Arrival {
+    bool folded;
+    double mean, distortion, energy;
+    HighOrderMesh mesh;
+    std::vector<Vec3> ideal_boxes;
+    std::vector<int> points;
+    Approach approach;
+    std::vector<FitState> states;
+    std::vector<FitSnapshot> starts;
+    int number;                            ///< number of the attempt
+    std::size_t stages_begin, stages_end;  ///< in the report
+  };
   void begin_try(const HighOrderTry& attempt);
+  std::optional<bool> try_first_orders(const HighOrderTry& attempt, int last);
+  Arrival arrival(bool folded, std::size_t stages_begin);
+  void return_to(Arrival& best, int last, std::size_t stages_before);
   bool run_order(Approach approach, int order);
   bool run_first_orders(int last);
   bool run_higher_orders();
@@ -102,68 +118,66 @@ bool HighOrderFit::run_order(Approach approach, int order) {
   return true;
 }
 
+/// Runs the orders up to `last` with one attempt. Returns true if the surface is folded then, which is not examined if
+/// there are no other attempts; nothing if the fit must end.
+std::optional<bool> HighOrderFit::try_first_orders(const HighOrderTry& attempt, int last) {
+  begin_try(attempt);
+  for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
+    if (!run_order(attempt.approach, order)) return {};
+  return schedule_.tries.size() == 1 ? false : is_folded();
+}
+
+/// Describes the present state, to which the present attempt has led by the stages from `stages_begin` on.
+HighOrderFit::Arrival HighOrderFit::arrival(bool folded, std::size_t stages_begin) {
+  const auto& steps = report_.stages.back().iterations;
+  const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
+  const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
+  return {folded,    measured_mean(), distortion, energy, mesh_,        ideal_boxes_,         points_,
+          approach_, states_,         starts_,    try_,   stages_begin, report_.stages.size()};
+}
+
+/// Makes an arrival the present state, and leaves the stages of other attempts out of the report, which had
+/// `stages_before` stages before the first one. Allocates nothing.
+void HighOrderFit::return_to(Arrival& best, int last, std::size_t stages_before) {
+  mesh_ = std::move(best.mesh);
+  ideal_boxes_ = std::move(best.ideal_boxes);
+  points_ = std::move(best.points);
+  approach_ = best.approach;
+  states_ = std::move(best.states);
+  starts_ = std::move(best.starts);
+  try_ = best.number;
+  order_ = last;
+  mean_.reset();
+  report_.undo_stages(stages_before, best.stages_begin);
+  report_.undo_stages(best.stages_end, report_.stages.size());
+}
+
 /// Runs the orders up to `last` with the first attempt that gets near the target without folding its surface, or else
 /// with the best attempt: unfolded before folded, then by the least energy.
 bool HighOrderFit::run_first_orders(int last) {
-  struct Arrival {
-    bool folded;
-    double mean, distortion, energy;
-    HighOrderMesh mesh;
-    std::vector<Vec3> ideal_boxes;
-    std::vector<int> points;
-    Approach approach;
-    std::vector<FitState> states;
-    std::vector<FitSnapshot> starts;
-    int number;                            ///< number of the attempt
-    std::size_t stages_begin, stages_end;  ///< in the report
-  };
   std::optional<Arrival> best;
   const std::size_t stages_before = report_.stages.size();
-  const auto take_best = [&] {  // allocates nothing
-    mesh_ = std::move(best->mesh);
-    ideal_boxes_ = std::move(best->ideal_boxes);
-    points_ = std::move(best->points);
-    approach_ = best->approach;
-    states_ = std::move(best->states);
-    starts_ = std::move(best->starts);
-    try_ = best->number;
-    order_ = last;
-    mean_.reset();
-    report_.undo_stages(stages_before, best->stages_begin);
-    report_.undo_stages(best->stages_end, report_.stages.size());
-  };
-  // True if folded; nothing if the fit must end.
-  const auto arrive = [&](const HighOrderTry& attempt) -> std::optional<bool> {
-    begin_try(attempt);
-    for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
-      if (!run_order(attempt.approach, order)) return {};
-    return schedule_.tries.size() == 1 ? false : is_folded();
-  };
   for (const HighOrderTry& attempt : schedule_.tries) {
     const std::size_t stages_begin = report_.stages.size();
     std::optional<bool> folded;
     try {
-      folded = arrive(attempt);
+      folded = try_first_orders(attempt, last);
     } catch (const std::bad_alloc&) {
-      if (best) take_best();
+      if (best) return_to(*best, last, stages_before);
       throw;
     }
     if (!folded) {
-      if (best) take_best();
+      if (best) return_to(*best, last, stages_before);
       return false;
     }
     if (schedule_.tries.size() == 1) return true;
-    const auto& steps = report_.stages.back().iterations;
-    const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
-    Arrival arrival{*folded,   measured_mean(), distortion, energy, mesh_,        ideal_boxes_,         points_,
-                    approach_, states_,         starts_,    try_,   stages_begin, report_.stages.size()};
-    const bool better = !best || std::tuple(arrival.folded, arrival.energy) < std::tuple(best->folded, best->energy);
-    if (better) best = std::move(arrival);
+    Arrival next = arrival(*folded, stages_begin);
+    const bool better = !best || std::tuple(next.folded, next.energy) < std::tuple(best->folded, best->energy);
+    if (better) best = std::move(next);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (!best->folded && fair) break;
   }
-  take_best();
+  return_to(*best, last, stages_before);
   set_orders(EntityOrders(mesh_.space.orders()));
   return true;
 }

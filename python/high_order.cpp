@@ -47,21 +47,9 @@ auto orders_shown(std::vector<int> EntityOrders::*orders_of) {
   };
 }
 
-}  // namespace
+using HighOrderClass = py::class_<CurvedMesh, std::shared_ptr<CurvedMesh>>;
 
-void add_high_order_mesh(py::module_& module) {
-  py::class_<CurvedMesh, std::shared_ptr<CurvedMesh>> type(
-      module, "HighOrderMesh",
-      R"(A mesh of curved cells: one coefficient for each point, then those of the modes of edges, faces and cells.
-
-mesh   VolumeMesh or its path: the cells start straight
-order  of every edge, face and cell, 1 .. 16
-basis  'legendre' or 'fourier')");
-  type.def(py::init(&make_curved), py::arg("mesh"), py::arg("order"),
-           R"(__init__(self, mesh, order, *, basis='legendre')
---
-
-Straight cells to begin with.)");
+void add_nodes_and_orders(HighOrderClass& type) {
   type.def_property_readonly(
       "coefficients",
       [](const py::object& self) { return shown_points(self.cast<const CurvedMesh&>().mesh.coefficients, self); },
@@ -75,6 +63,9 @@ Straight cells to begin with.)");
   type.def_property_readonly("edge_orders", orders_shown(&EntityOrders::edges), "Of each edge: (n,) int32. A view.");
   type.def_property_readonly("face_orders", orders_shown(&EntityOrders::faces), "Of each face: (n,) int32. A view.");
   type.def_property_readonly("cell_orders", orders_shown(&EntityOrders::cells), "Of each cell: (n,) int32. A view.");
+}
+
+void add_regions(HighOrderClass& type) {
   type.def_property_readonly(
       "references",
       [](const py::object& self) {
@@ -92,6 +83,10 @@ Straight cells to begin with.)");
         return to_python(cli::regions_json(measure_regions(curved.mesh, {curved.references, curved.regions}, nullptr)));
       },
       "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
+}
+
+/// What is known at points inside the cells.
+void add_positions(HighOrderClass& type) {
   type.def(
       "point_map",
       [](const CurvedMesh& curved, const py::object& cells, const py::object& points) {
@@ -108,6 +103,10 @@ Straight cells to begin with.)");
       },
       py::arg("cells"), py::arg("points"),
       "evaluate($self, cells, points)\n--\n\nPositions at points of cells: (n, 3). Arguments as of point_map.");
+}
+
+/// What makes other meshes of this one.
+void add_other_meshes(HighOrderClass& type) {
   type.def(
       "straight_sided",
       [](const CurvedMesh& curved) {
@@ -144,6 +143,27 @@ Straight cells to begin with.)");
   type.def(
       "copy", [](const CurvedMesh& curved) { return std::make_shared<CurvedMesh>(curved); },
       "copy($self)\n--\n\nA mesh of its own with the same content.");
+}
+
+}  // namespace
+
+void add_high_order_mesh(py::module_& module) {
+  HighOrderClass type(
+      module, "HighOrderMesh",
+      R"(A mesh of curved cells: one coefficient for each point, then those of the modes of edges, faces and cells.
+
+mesh   VolumeMesh or its path: the cells start straight
+order  of every edge, face and cell, 1 .. 16
+basis  'legendre' or 'fourier')");
+  type.def(py::init(&make_curved), py::arg("mesh"), py::arg("order"),
+           R"(__init__(self, mesh, order, *, basis='legendre')
+--
+
+Straight cells to begin with.)");
+  add_nodes_and_orders(type);
+  add_regions(type);
+  add_positions(type);
+  add_other_meshes(type);
   type.def("__repr__", [](const CurvedMesh& curved) {
     const ElementSpace& space = curved.mesh.space;
     return "<subvol.HighOrderMesh: " + std::to_string(space.num_cells()) + " cells of order " +

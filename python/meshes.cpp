@@ -170,36 +170,9 @@ std::string volume_text(const VolumeMesh& mesh) {
   return text + '>';
 }
 
-void add_volume_mesh(py::module_& module) {
-  py::class_<VolumeMesh, std::shared_ptr<VolumeMesh>> type(module, "VolumeMesh",
-                                                           R"(A mesh of linear hexes, prisms, tets and pyramids.
+using VolumeClass = py::class_<VolumeMesh, std::shared_ptr<VolumeMesh>>;
 
-points      (n, 3) numbers, in the mesh's own unit of length
-hexes       (n, 8) point numbers: 0 1 2 3 seen from 4 5 6 7 counter-clockwise
-prisms      (n, 6): 0 1 2 seen from 3 4 5 counter-clockwise
-tets        (n, 4): 0 1 2 seen from 3 counter-clockwise
-pyramids    (n, 5): 0 1 2 3 seen from the apex 4 counter-clockwise
-references  a group number for each cell: of the hexes, then the prisms, the tets and the pyramids
-creases     (n, 2) boundary edges kept sharp, for ever or through so many refinements
-corners     (n,) boundary points kept in their place
-
-Groups of faces, as of physical groups, side sets or materials:
-group_names    list of str, and group_numbers (n,): one for each group; numbers are 1, 2, .. unless given
-grouped_faces  (n, 4) point numbers of faces in any order; -1 in place of the fourth of a triangle
-face_groups    (n,) the place of each face's group in group_names
-
-The arrays given are copied. Those of a mesh are views of its memory, which they keep alive; only points can be written.
-What is wrong with a mesh is told by `check`; InputError here only for arrays that do not fit together.)");
-  type.def(py::init(&make_volume), py::arg("points"),
-           R"(__init__(self, points, *, hexes=None, prisms=None, tets=None, pyramids=None, references=None,
-    creases=None, crease_sharpness=None, corners=None, corner_sharpness=None, grouped_faces=None, face_groups=None,
-    group_names=None, group_numbers=None)
---
-
-Takes the arrays named above.)");
-  type.def_property_readonly(
-      "points", [](const py::object& self) { return shown_points(self.cast<const VolumeMesh&>().positions, self); },
-      "(n, 3) float64. A view that can be written.");
+void add_cell_arrays(VolumeClass& type) {
   for (const auto& [kind, plural] : kCellKindNames)
     type.def_property_readonly(
         plural, [k = kind](const py::object& self) { return cells_of(self, k); },
@@ -231,6 +204,39 @@ Takes the arrays named above.)");
         return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
       },
       "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
+}
+
+void add_volume_mesh(py::module_& module) {
+  VolumeClass type(module, "VolumeMesh",
+                   R"(A mesh of linear hexes, prisms, tets and pyramids.
+
+points      (n, 3) numbers, in the mesh's own unit of length
+hexes       (n, 8) point numbers: 0 1 2 3 seen from 4 5 6 7 counter-clockwise
+prisms      (n, 6): 0 1 2 seen from 3 4 5 counter-clockwise
+tets        (n, 4): 0 1 2 seen from 3 counter-clockwise
+pyramids    (n, 5): 0 1 2 3 seen from the apex 4 counter-clockwise
+references  a group number for each cell: of the hexes, then the prisms, the tets and the pyramids
+creases     (n, 2) boundary edges kept sharp, for ever or through so many refinements
+corners     (n,) boundary points kept in their place
+
+Groups of faces, as of physical groups, side sets or materials:
+group_names    list of str, and group_numbers (n,): one for each group; numbers are 1, 2, .. unless given
+grouped_faces  (n, 4) point numbers of faces in any order; -1 in place of the fourth of a triangle
+face_groups    (n,) the place of each face's group in group_names
+
+The arrays given are copied. Those of a mesh are views of its memory, which they keep alive; only points can be written.
+What is wrong with a mesh is told by `check`; InputError here only for arrays that do not fit together.)");
+  type.def(py::init(&make_volume), py::arg("points"),
+           R"(__init__(self, points, *, hexes=None, prisms=None, tets=None, pyramids=None, references=None,
+    creases=None, crease_sharpness=None, corners=None, corner_sharpness=None, grouped_faces=None, face_groups=None,
+    group_names=None, group_numbers=None)
+--
+
+Takes the arrays named above.)");
+  type.def_property_readonly(
+      "points", [](const py::object& self) { return shown_points(self.cast<const VolumeMesh&>().positions, self); },
+      "(n, 3) float64. A view that can be written.");
+  add_cell_arrays(type);
   add_tags(type);
   add_groups(type);
   type.def_property_readonly(

@@ -217,7 +217,8 @@ first_height  thickness of the layer at the surface, as text: a length, or '2%':
               layers from growth
 region        grow on the boundary of this region of the surface or of the cells: its name or number; None: on the
               outer surface
-skip          list of patches without layers: names or numbers of groups, or points 'X,Y,Z' on patches between sharp edges
+skip          list of patches without layers: names or numbers of groups, or points 'X,Y,Z' on patches between sharp
+              edges
 repair        faults of the surface are repaired by changes within this distance, as text: a length, or '2%'; '0': none
 side          'outward' where the faces' normals point, 'inward', or 'both'
 free_surface  the surface's points may slide along it for the cells' sake

@@ -228,11 +228,8 @@ MeshPointer make_split(const py::object& object, const py::kwargs& given) {
   });
 }
 
-}  // namespace
-
-void add_templates(py::module_& module) {
-  py::module_ group = module.def_submodule("_template", "Makes and edits coarse meshes to fit with.");
-  group.attr("__name__") = "subvol.template";
+/// What makes a mesh of a surface, a box or a grid.
+void add_makers(py::module_& group) {
   group.def("auto", &make_auto, py::arg("target"),
             R"(auto(target, *, cells=300, pillow=False, progress=None, threads=None)
 --
@@ -263,6 +260,10 @@ with invert, the others.)");
 Stacks hexes and prisms on the faces of a surface, along its normals or a direction (x, y, z).
 
 thickness  length of all layers together)");
+}
+
+/// What changes the cells of a mesh.
+void add_edits(py::module_& group) {
   group.def("pillow", &make_pillowed, py::arg("mesh"),
             R"(pillow(mesh, *, list=None)
 --
@@ -291,6 +292,15 @@ Glues faces that lie on each other, of one mesh or two; tolerance in percent of 
 --
 
 Cuts the sheet of an edge into 'parts', or all cells into 'prisms' along an edge, or 'tets'.)");
+}
+
+}  // namespace
+
+void add_templates(py::module_& module) {
+  py::module_ group = module.def_submodule("_template", "Makes and edits coarse meshes to fit with.");
+  group.attr("__name__") = "subvol.template";
+  add_makers(group);
+  add_edits(group);
 }
 
 }  // namespace subvol::python

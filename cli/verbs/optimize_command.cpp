@@ -17,36 +17,39 @@ namespace subvol::cli {
 using namespace internal;
 namespace {
 
-void add_options(CLI::App& verb, OptimizeArguments& arguments) {
+/// What the boundary is to be like, and the sizes of the cells.
+void add_boundary_options(CLI::App& verb, OptimizeArguments& arguments) {
   OptimizeOptions& optimize = arguments.optimize;
   CLI::Option* target = verb.add_option("--target", arguments.target,
                                         "Surface that the boundary is to reproduce: " + surface_formats() +
                                             "; or a volume mesh, for its boundary (default: the boundary as it is)")
                             ->type_name("SURFACE");
-  CLI::Option* fixed = verb.add_flag("--fixed-boundary", optimize.fixed_boundary,
-                                     "Keep boundary vertices where they are; otherwise they slide along the surface")
-                           ->excludes(target);
-  CLI::Option* sizes =
-      verb.add_option("--sizes", arguments.sizes,
-                      "Ideal sizes of the cells: all alike, or as they are, so that graded meshes stay graded")
-          ->check(CLI::IsMember({"uniform", "local"}))
-          ->type_name("uniform|local")
-          ->capture_default_str();
+  verb.add_flag("--fixed-boundary", optimize.fixed_boundary,
+                "Keep boundary vertices where they are; otherwise they slide along the surface")
+      ->excludes(target);
+  verb.add_option("--sizes", arguments.sizes,
+                  "Ideal sizes of the cells: all alike, or as they are, so that graded meshes stay graded")
+      ->check(CLI::IsMember({"uniform", "local"}))
+      ->type_name("uniform|local")
+      ->capture_default_str();
   verb.add_option("--crease-angle", optimize.crease_angle_degrees, "Keep edges of the surface sharper than this sharp")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES")
       ->capture_default_str();
+}
+
+/// What is aimed at, and how it is weighed.
+void add_goal_options(CLI::App& verb, OptimizeOptions& optimize) {
   verb.add_option("--tolerance", optimize.mean_tolerance_percent,
                   "Mean distance from the surface to keep within, in percent of the diagonal of its bounding box;\n"
                   "exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
-  CLI::Option* max =
-      verb.add_option("--max-tolerance", optimize.max_tolerance_percent, "The same for the largest distance")
-          ->check(number_in(1e-9, 100.0))
-          ->type_name("PERCENT")
-          ->capture_default_str();
+  verb.add_option("--max-tolerance", optimize.max_tolerance_percent, "The same for the largest distance")
+      ->check(number_in(1e-9, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
   verb.add_option("--quality", optimize.quality, "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
       ->check(number_in(0.0, kMostQuality))
       ->type_name("Q")
@@ -57,6 +60,10 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str();
+}
+
+/// How long it may take.
+void add_optimize_limits(CLI::App& verb, OptimizeOptions& optimize) {
   verb.add_option("--max-iterations", optimize.control.max_iterations,
                   "Steps per stage (default: as many as the schedule asks for)")
       ->check(whole_number_in(1, 1'000'000))
@@ -65,12 +72,16 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
                   "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
+}
+
+/// To be called last: these options need some of the others, and exclude some.
+void add_curved_element_options(CLI::App& verb, OptimizeArguments& arguments) {
   const auto group = "Curved elements";
   CLI::Option* order =
       verb.add_option("--order", arguments.order, "Curve the cells to this order so that they follow --target")
           ->check(whole_number_in(2, kMaxOrder))
           ->type_name("P")
-          ->needs(target)
+          ->needs(verb.get_option("--target"))
           ->group(group);
   verb.add_option("--basis", arguments.basis, "Modes of the curved elements")
       ->check(CLI::IsMember({"fourier", "legendre"}))
@@ -79,7 +90,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->needs(order)
       ->group(group);
   add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
-  for (CLI::Option* other : {fixed, sizes, max}) order->excludes(other);
+  for (const char* other : {"--fixed-boundary", "--sizes", "--max-tolerance"}) order->excludes(verb.get_option(other));
 }
 
 }  // namespace
@@ -91,7 +102,10 @@ void add_optimize_command(CLI::App& app, Action& action) {
       ->required()
       ->type_name("FILE");
   add_references_option(*verb, arguments->run);
-  add_options(*verb, *arguments);
+  add_boundary_options(*verb, *arguments);
+  add_goal_options(*verb, arguments->optimize);
+  add_optimize_limits(*verb, arguments->optimize);
+  add_curved_element_options(*verb, *arguments);
   add_output_options(
       *verb, arguments->run,
       "The mesh, or its surface, by extension: " + output_formats() +

@@ -312,7 +312,8 @@ int ShellRun::run() {
   return of_shell == kDone ? polynomial_cells_status(polynomials_) : of_shell;
 }
 
-void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
+/// How thick the layers are.
+void add_thickness_options(CLI::App& verb, ShellArguments& arguments) {
   ShellOptions& shell = arguments.shell;
   verb.add_option("--thickness", arguments.thickness,
                   "Thickness of each side, in the mesh's unit or as 2% of the bounding box's diagonal")
@@ -335,6 +336,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Thickness of the layer at the surface, as a length or 2%: the growth follows from --layers, or the\n"
                   "layers from --growth")
       ->type_name("H");
+}
+
+/// Where on the surface the layers grow, and to which side.
+void add_surface_options(CLI::App& verb, ShellArguments& arguments) {
   verb.add_option("--region", arguments.region,
                   "Grow on the boundary of this region of SURFACE, which may be a mesh of cells: its name or number\n"
                   "(default: on the outer surface)")
@@ -353,13 +358,20 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->check(CLI::IsMember({"outward", "inward", "both"}))
       ->type_name("outward|inward|both")
       ->capture_default_str();
-  verb.add_flag("--free-surface", shell.free_surface,
+}
+
+/// How the columns of cells stand on the surface, and what they keep of it.
+void add_column_options(CLI::App& verb, ShellArguments& arguments) {
+  verb.add_flag("--free-surface", arguments.shell.free_surface,
                 "Let the surface's vertices slide along it for better cells; its border and creases stay");
   verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimization");
   verb.add_option("--crease-angle", arguments.crease_angle_degrees,
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
+}
+
+void add_curved_layer_options(CLI::App& verb, ShellArguments& arguments) {
   CLI::Option* order = verb.add_option("--order", arguments.order,
                                        "Order of the cells; above 1 they are curved, but for the surface itself")
                            ->check(whole_number_in(1, kMaxOrder))
@@ -371,6 +383,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->capture_default_str()
       ->needs(order);
   add_map_tolerance(verb, arguments.writing)->needs(order);
+}
+
+/// How long it may take.
+void add_shell_limits(CLI::App& verb, ShellOptions& shell) {
   verb.add_option("--max-iterations", shell.control.max_iterations, "Steps per solve (default: 60)")
       ->check(whole_number_in(1, 1'000'000))
       ->type_name("N");
@@ -388,7 +404,11 @@ void add_shell_command(CLI::App& app, Action& action) {
                    "Triangles and quads: " + surface_formats() + "; or a volume mesh, for its boundary")
       ->required()
       ->type_name("FILE");
-  add_shell_options(*verb, *arguments);
+  add_thickness_options(*verb, *arguments);
+  add_surface_options(*verb, *arguments);
+  add_column_options(*verb, *arguments);
+  add_curved_layer_options(*verb, *arguments);
+  add_shell_limits(*verb, arguments->shell);
   add_output_options(*verb, arguments->run,
                      "The layers, or their sheets, by extension: " + output_formats() +
                          "; cage:FILE for the layers as a control mesh with creases, cutaway:FILE.glb for the cells\n"

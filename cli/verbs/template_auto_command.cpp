@@ -165,7 +165,8 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
       ->type_name("KIND");
   verb->footer(
-      R"(Exit status 4: so many cells cannot carry the topology; the template has more. Status 3: no grid that was tried can.
+      R"(Exit status 4: so many cells cannot carry the topology; the template has more.
+Status 3: no grid that was tried can.
 
 Example:
   subvol template auto bone.off --cells 300 -o bone_template.mesh)");

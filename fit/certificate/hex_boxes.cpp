@@ -25,6 +25,11 @@ constexpr double kModelErrorShare = 0.1, kGoodHexDeterminant = 0.5;
 /// 1 for those of the first kWide entries of a matrix, stored by columns, that belong to the column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
 
+Wide higher_of(Wide x, const Wide& y) {
+  take_higher(x, y);
+  return x;
+}
+
 }  // namespace
 
 template <class Vector>
@@ -77,13 +82,87 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   fits_single_ = total < kMostSinglePrecisionTotal && total > 1 / kMostSinglePrecisionTotal;
 }
 
+/// Bounds of sums over the modes a_ijk of one row of J, in `sums_`; see `make_weights`. A line is `lanes_` numbers.
+struct HexBoxes::RowSums {
+  double *by_j, *by_j_slope;  ///< of the sums over k of a_ijk N_k and a_ijk N_k': a line of all i for each j
+  double *by_k, *by_k_slope;  ///< of the sums over j of a_ijk N_j and a_ijk N_j': a line of all i for each k
+  double* steps;              ///< |a_1jk - a_0jk|: a line of all j for each k
+  double* steps_by_j;         ///< of the sums over k of (a_1jk - a_0jk) N_k: one line of all j
+};
+
 /// Bounds |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i| and |sum_i x_i N_i'| <= |x_1 - x_0| + ...
 /// for two directions, one after the other. The indices i are in lanes.
 void HexBoxes::make_weights() {
-  const auto larger = [](Wide x, const Wide& y) {
-    take_higher(x, y);
-    return x;
+  const int size = n_ * lanes_;
+  double* all = sums_.data();
+  const RowSums sums{all, all + size, all + 2 * size, all + 3 * size, all + 4 * size, all + 5 * size};
+  for (int row = 0; row < 3; ++row) {
+    for (int first = 0; first < lanes_; first += kWide) {
+      sum_modes(row, first, sums);
+      make_mode_weights_along_u(row, first, sums);
+    }
+    sum_steps(row, sums);
+    make_other_weights(row, sums);
+  }
+  for (int d = 0; d < 3; ++d)
+    for (int i = 2; i < n_; ++i)
+      is_used_[d][i] = weight(d, i, 0, d) > 0 || weight(d, i, 1, d) > 0 || weight(d, i, 2, d) > 0;
+}
+
+/// Fills `by_j`, `by_k` and their slopes for the kWide indices i from `first` on.
+void HexBoxes::sum_modes(int row, int first, const RowSums& sums) {
+  const int layer = contraction_.row();
+  const double* modes = contraction_.modes(row) + first;
+  const double *value = bounds_.data(), *slope = slope_bounds_.data();
+  // Sums over one index, whose neighbors are `step` apart, for every value of another one, whose neighbors are `stride`
+  // apart.
+  const auto sum_over = [&](int step, int stride, double* by_other, double* by_other_slope) {
+    for (int m = 0; m < n_; ++m) {
+      const auto at = [&](int i) { return load_wide(modes + m * stride + i * step); };
+      const Wide x0 = at(0), x1 = at(1);
+      Wide sum = higher_of(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
+      for (int i = 2; i < n_; ++i) {
+        const Wide x = size_of(at(i));
+        sum += value[i] * x, slopes += slope[i] * x;
+      }
+      store_wide(sum, by_other + m * lanes_ + first);
+      store_wide(slopes, by_other_slope + m * lanes_ + first);
+    }
   };
+  sum_over(layer, n_, sums.by_j, sums.by_j_slope);
+  sum_over(n_, layer, sums.by_k, sums.by_k_slope);
+}
+
+/// Makes the weights along u of the modes among the kWide indices i from `first` on.
+void HexBoxes::make_mode_weights_along_u(int row, int first, const RowSums& sums) {
+  const double* value = bounds_.data();
+  const double* const by_other[3] = {sums.by_k, sums.by_k_slope, sums.by_j_slope};
+  for (int column = 0; column < 3; ++column) {
+    const auto of = [&](int m) { return load_wide(by_other[column] + m * lanes_ + first); };
+    Wide sum = higher_of(of(0), of(1));
+    for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
+    for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i) weight(0, i, row, column) = sum[i - first];
+  }
+}
+
+/// Fills `steps` and `steps_by_j`.
+void HexBoxes::sum_steps(int row, const RowSums& sums) {
+  const double *modes = contraction_.modes(row), *value = bounds_.data();
+  for (int k = 0; k < n_; ++k)
+    for (int j = 0; j < n_; ++j) {
+      const double* x = modes + k * contraction_.row() + j * n_;
+      sums.steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
+    }
+  for (int first = 0; first < lanes_; first += kWide) {
+    const auto of = [&](int k) { return load_wide(sums.steps + k * lanes_ + first); };
+    Wide sum = higher_of(of(0), of(1));
+    for (int k = 2; k < n_; ++k) sum += value[k] * of(k);
+    store_wide(sum, sums.steps_by_j + first);
+  }
+}
+
+/// Makes the weight of the steps along u, and the weights along v and w.
+void HexBoxes::make_other_weights(int row, const RowSums& sums) {
   // Sum over the indices in lanes.
   const auto modes_along = [&](const double* x, const AlignedDoubles& bounds) {
     Wide sum{};
@@ -91,69 +170,16 @@ void HexBoxes::make_weights() {
     return sum_of_lanes(sum);
   };
   const auto along = [&](const double* x) { return std::max(x[0], x[1]) + modes_along(x, mode_bounds_); };
-  const int line = n_ * lanes_, layer = contraction_.row();
-  double *by_j = sums_.data(), *by_j_slope = by_j + line, *by_k = by_j_slope + line, *by_k_slope = by_k + line,
-         *steps = by_k_slope + line, *steps_by_j = steps + line;
-  const double *value = bounds_.data(), *slope = slope_bounds_.data();
-  for (int row = 0; row < 3; ++row) {
-    const double* modes = contraction_.modes(row);
-    for (int first = 0; first < lanes_; first += kWide) {
-      const auto at = [&](int j, int k) { return load_wide(modes + k * layer + j * n_ + first); };
-      for (int j = 0; j < n_; ++j) {
-        const Wide x0 = at(j, 0), x1 = at(j, 1);
-        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
-        for (int k = 2; k < n_; ++k) {
-          const Wide x = size_of(at(j, k));
-          sum += value[k] * x, slopes += slope[k] * x;
-        }
-        store_wide(sum, by_j + j * lanes_ + first);
-        store_wide(slopes, by_j_slope + j * lanes_ + first);
-      }
-      for (int k = 0; k < n_; ++k) {
-        const Wide x0 = at(0, k), x1 = at(1, k);
-        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
-        for (int j = 2; j < n_; ++j) {
-          const Wide x = size_of(at(j, k));
-          sum += value[j] * x, slopes += slope[j] * x;
-        }
-        store_wide(sum, by_k + k * lanes_ + first);
-        store_wide(slopes, by_k_slope + k * lanes_ + first);
-      }
-      const double* const sums[3] = {by_k, by_k_slope, by_j_slope};
-      for (int column = 0; column < 3; ++column) {
-        const auto of = [&](int m) { return load_wide(sums[column] + m * lanes_ + first); };
-        Wide sum = larger(of(0), of(1));
-        for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
-        for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i)
-          weight(0, i, row, column) = sum[i - first];
-      }
-    }
-
-    // |a_1jk - a_0jk|, indexed by k and j, and the bound of their sum over k.
-    for (int k = 0; k < n_; ++k)
-      for (int j = 0; j < n_; ++j) {
-        const double* x = modes + k * layer + j * n_;
-        steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
-      }
-    for (int first = 0; first < lanes_; first += kWide) {
-      const auto of = [&](int k) { return load_wide(steps + k * lanes_ + first); };
-      Wide sum = larger(of(0), of(1));
-      for (int k = 2; k < n_; ++k) sum += value[k] * of(k);
-      store_wide(sum, steps_by_j + first);
-    }
-    weight(0, 1, row, 0) = along(steps_by_j);
-    for (int m = 2; m < n_; ++m) {
-      weight(1, m, row, 0) = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
-      weight(1, m, row, 1) = along(by_j + m * lanes_);
-      weight(1, m, row, 2) = along(by_j_slope + m * lanes_);
-      weight(2, m, row, 0) = modes_along(by_k + m * lanes_, mode_slope_bounds_) + along(steps + m * lanes_);
-      weight(2, m, row, 1) = along(by_k_slope + m * lanes_);
-      weight(2, m, row, 2) = along(by_k + m * lanes_);
-    }
+  weight(0, 1, row, 0) = along(sums.steps_by_j);
+  for (int m = 2; m < n_; ++m) {
+    const int line = m * lanes_;
+    weight(1, m, row, 0) = modes_along(sums.by_j + line, mode_slope_bounds_) + sums.steps_by_j[m];
+    weight(1, m, row, 1) = along(sums.by_j + line);
+    weight(1, m, row, 2) = along(sums.by_j_slope + line);
+    weight(2, m, row, 0) = modes_along(sums.by_k + line, mode_slope_bounds_) + along(sums.steps + line);
+    weight(2, m, row, 1) = along(sums.by_k_slope + line);
+    weight(2, m, row, 2) = along(sums.by_k + line);
   }
-  for (int d = 0; d < 3; ++d)
-    for (int i = 2; i < n_; ++i)
-      is_used_[d][i] = weight(d, i, 0, d) > 0 || weight(d, i, 1, d) > 0 || weight(d, i, 2, d) > 0;
 }
 
 void HexBoxes::find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result) {

@@ -127,7 +127,13 @@ class HexBoxes {
   double choose_models(Box& box);
   static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
   void find_coefficients(Box& box);
+  struct RowSums;
+  /// Makes the weights and `is_used_`, for each row of J from `RowSums` of it.
   void make_weights();
+  void sum_modes(int row, int first, const RowSums& sums);
+  void make_mode_weights_along_u(int row, int first, const RowSums& sums);
+  void sum_steps(int row, const RowSums& sums);
+  void make_other_weights(int row, const RowSums& sums);
   const LineError& line_error(const Box& box, int direction) {
     const int level = box.modeled_levels[direction], zone = LineModels::zone(level, box.modeled_index[direction]);
     LineError& result = errors_[direction][level][box.tiers[direction]][zone];
@@ -170,7 +176,7 @@ class HexBoxes {
   LineModels::PerFunction bounds_, slope_bounds_;  // of N_i and N_i'
   // In lanes: bounds of N_i from i = 2 on, of their slopes, and the inverses of both.
   AlignedDoubles mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;
-  AlignedDoubles sums_;  // scratch of make_weights
+  AlignedDoubles sums_;  // RowSums
 };
 
 }  // namespace subvol::internal

@@ -52,6 +52,17 @@ double largest_integrated_legendre(int i) {
          std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kLegendreSamples * kLegendreSamples);
 }
 
+/// Returns the value at 1/2 of a polynomial with these Bernstein coefficients.
+long double value_in_middle(std::span<const long double> coefficients) {
+  const int degree = static_cast<int>(coefficients.size()) - 1;
+  long double value = 0, binomial = 1;
+  for (int o = 0; o <= degree; ++o) {
+    value += std::ldexp(binomial * coefficients[o], -degree);
+    binomial = binomial * (degree - o) / (o + 1);
+  }
+  return value;
+}
+
 }  // namespace
 
 const LineModels& LineModels::get(Basis basis, int order, int degree) {
@@ -83,20 +94,30 @@ const LineModels::Level& LineModels::level(int l) const {
 }
 
 LineModels::Level LineModels::make_level(int l) const {
+  Level level;
+  level.coefficients.assign((std::size_t{1} << l) * (order_ + 1) * kStride, 0);
+  model_corner_functions(l, level);
+  model_modes(l, level);
+  fill_single_precision(level);
+  return level;
+}
+
+/// Fills the coefficients of N_0 and N_1.
+void LineModels::model_corner_functions(int l, Level& level) const {
   const int q = degree_, parts = 1 << l;
   const long double size = std::ldexp(1.0L, -l);
-  Level level;
-  level.coefficients.assign(static_cast<std::size_t>(parts) * (order_ + 1) * kStride, 0);
-  const auto row = [&](int part, int i) {
-    return level.coefficients.data() + (static_cast<std::size_t>(part) * (order_ + 1) + i) * kStride;
-  };
   for (int part = 0; part < parts; ++part)
     for (int o = 0; o <= q; ++o) {
       const long double x = (part + static_cast<long double>(o) / q) * size;
-      row(part, 0)[o] = static_cast<double>(1 - x);
-      row(part, 1)[o] = static_cast<double>(x);
+      coefficients(level, part, 0)[o] = static_cast<double>(1 - x);
+      coefficients(level, part, 1)[o] = static_cast<double>(x);
     }
+}
 
+/// Fills the coefficients of the other functions, and bounds all errors.
+void LineModels::model_modes(int l, Level& level) const {
+  const int q = degree_, parts = 1 << l;
+  const long double size = std::ldexp(1.0L, -l);
   // Radius times frequency decides how many nodes make the interpolant exact for all purposes.
   const double widest = order_ * std::numbers::pi * static_cast<double>(size) / 2;
   const int num_nodes = basis_ == Basis::legendre ? std::max(order_, q) : q + 10 + static_cast<int>(2.2 * widest);
@@ -124,34 +145,33 @@ LineModels::Level LineModels::make_level(int l) const {
         for (int o = 0; o < q; ++o) slope[o] += expanded[k] * to_bernstein[k][o];
       value[0] = 0;
       for (int o = 0; o < q; ++o) value[o + 1] = value[o] + slope[o] * size / q;
-      long double middle = 0, binomial = 1;
-      for (int o = 0; o <= q; ++o) {
-        middle += std::ldexp(binomial * value[o], -q);
-        binomial = binomial * (q - o) / (o + 1);
-      }
-      const long double shift = mode_value(basis_, i, mid) - middle;
-      for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
+      const long double shift = mode_value(basis_, i, mid) - value_in_middle(value);
+      for (int o = 0; o <= q; ++o) coefficients(level, part, i + 1)[o] = static_cast<double>(value[o] + shift);
     }
   }
+}
+
+/// Fills what `Level` holds for single precision, and the largest coefficients.
+void LineModels::fill_single_precision(Level& level) const {
+  const int q = degree_;
   level.narrow_coefficients.resize(level.coefficients.size());
   std::transform(level.coefficients.begin(), level.coefficients.end(), level.narrow_coefficients.begin(),
                  [](double b) { return static_cast<float>(b); });
   level.deviations.assign(level.coefficients.size(), 0);
-  for (int part = 0; part < parts; ++part)
-    for (int i = 0; i <= order_; ++i) {
-      const double* b = row(part, i);
-      float* deviations = level.deviations.data() + (b - level.coefficients.data());
-      const auto [least, largest] = std::minmax_element(b, b + q + 1);
-      const double middle = 0.5 * (*least + *largest), bound = std::max(-*least, *largest);
-      level.largest_coefficient[i] = std::max(level.largest_coefficient[i], bound);
-      for (int o = 0; o <= q; ++o) deviations[o] = static_cast<float>(b[o] - middle);
-      float* then = deviations + q + 1;
-      then[kMiddle] = static_cast<float>(middle);
-      then[kLargestDeviation] = static_cast<float>(*largest - middle);
-      then[kMiddleSize] = std::abs(then[kMiddle]);
-      then[kLargest] = static_cast<float>(bound);
-    }
-  return level;
+  for (std::size_t at = 0; at < level.coefficients.size(); at += kStride) {
+    const std::size_t i = at / kStride % (order_ + 1);
+    const double* b = level.coefficients.data() + at;
+    float* deviations = level.deviations.data() + at;
+    const auto [least, largest] = std::minmax_element(b, b + q + 1);
+    const double middle = 0.5 * (*least + *largest), bound = std::max(-*least, *largest);
+    level.largest_coefficient[i] = std::max(level.largest_coefficient[i], bound);
+    for (int o = 0; o <= q; ++o) deviations[o] = static_cast<float>(b[o] - middle);
+    float* then = deviations + q + 1;
+    then[kMiddle] = static_cast<float>(middle);
+    then[kLargestDeviation] = static_cast<float>(*largest - middle);
+    then[kMiddleSize] = std::abs(then[kMiddle]);
+    then[kLargest] = static_cast<float>(bound);
+  }
 }
 
 }  // namespace subvol::internal

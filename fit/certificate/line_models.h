@@ -75,6 +75,12 @@ class LineModels {
  private:
   LineModels(Basis basis, int order, int degree);
   Level make_level(int l) const;
+  double* coefficients(Level& level, int index, int i) const {
+    return level.coefficients.data() + (static_cast<std::size_t>(index) * (order_ + 1) + i) * kStride;
+  }
+  void model_corner_functions(int l, Level& level) const;
+  void model_modes(int l, Level& level) const;
+  void fill_single_precision(Level& level) const;
 
   Basis basis_;
   int order_, degree_;

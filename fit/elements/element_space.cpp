@@ -87,6 +87,51 @@ struct CellEntry {
   std::int8_t sign;
 };
 
+/// Lists the modes of a cell and of its vertices, edges and faces, ascending, in place of what `entries` held. The
+/// nodes of the space must have their numbers. Returns the highest order of these edges and faces and of the cell.
+int list_entries(const ElementSpace& space, std::size_t c, std::vector<CellEntry>& entries) {
+  const MeshTopology& mesh = space.topology();
+  const EntityOrders& orders = space.orders();
+  const CellKind kind = space.kind(c);
+  const std::span<const Index> corners = space.vertices(c);
+  const auto local = [&](Index v) {
+    return static_cast<int>(std::find(corners.begin(), corners.end(), v) - corners.begin());
+  };
+  entries.clear();
+  std::size_t node = 0;
+  const auto add = [&](const SignedMode& m) {
+    entries.push_back({m.mode, static_cast<Index>(node++), static_cast<std::int8_t>(m.sign)});
+  };
+  int order = orders.cells[c];
+  for (std::size_t v = 0; v < corners.size(); ++v) {
+    node = corners[v];
+    add({vertex_mode(kind, static_cast<int>(v))});
+  }
+  for (const Index e : mesh.cell_edges(c)) {
+    const int a = local(mesh.edge(e)[0]), b = local(mesh.edge(e)[1]);
+    order = std::max(order, orders.edges[e]);
+    node = space.edge_nodes(e);
+    for_each_mode(EntityShape::edge, orders.edges[e], [&](ModeIndex m) { add(edge_mode(kind, a, b, m.i)); });
+  }
+  for (const Index f : mesh.cell_faces(c)) {
+    const EntityShape shape = space.face_shape(f);
+    const std::array<Index, 4>& frame = space.face_frame(f);
+    const int a = local(frame[0]), b = local(frame[1]);
+    const int last = local(frame[shape == EntityShape::triangle ? 2 : 3]);
+    order = std::max(order, orders.faces[f]);
+    node = space.face_nodes(f);
+    for_each_mode(shape, orders.faces[f], [&](ModeIndex m) {
+      add(shape == EntityShape::triangle ? triangle_mode(kind, a, b, last, m.i, m.j)
+                                         : quad_mode(kind, a, b, last, m.i, m.j));
+    });
+  }
+  node = space.cell_nodes(c);
+  for_each_mode(entity_shape(kind), orders.cells[c], [&](ModeIndex m) { add({cell_mode(kind, m)}); });
+
+  std::sort(entries.begin(), entries.end(), [](const CellEntry& x, const CellEntry& y) { return x.mode < y.mode; });
+  return order;
+}
+
 }  // namespace
 
 EntityOrders EntityOrders::uniform(const MeshTopology& topology, int order) {
@@ -165,49 +210,12 @@ void ElementSpace::number_nodes() {
 }
 
 void ElementSpace::list_cell_modes() {
-  const MeshTopology& mesh = topology();
   std::map<std::pair<CellKind, std::vector<LocalMode>>, Index> known;
   std::vector<CellEntry> entries;
   std::vector<LocalMode> modes;
   offsets_.assign(1, 0);
   for (std::size_t c = 0; c < num_cells(); ++c) {
-    const CellKind cell_kind = kind(c);
-    const std::span<const Index> corners = vertices(c);
-    const auto local = [&](Index v) {
-      return static_cast<int>(std::find(corners.begin(), corners.end(), v) - corners.begin());
-    };
-    entries.clear();
-    std::size_t node = 0;
-    const auto add = [&](const SignedMode& m) {
-      entries.push_back({m.mode, static_cast<Index>(node++), static_cast<std::int8_t>(m.sign)});
-    };
-    int order = orders_.cells[c];
-    for (std::size_t v = 0; v < corners.size(); ++v) {
-      node = corners[v];
-      add({vertex_mode(cell_kind, static_cast<int>(v))});
-    }
-    for (const Index e : mesh.cell_edges(c)) {
-      const int a = local(mesh.edge(e)[0]), b = local(mesh.edge(e)[1]);
-      order = std::max(order, orders_.edges[e]);
-      node = edge_nodes_[e];
-      for_each_mode(EntityShape::edge, orders_.edges[e], [&](ModeIndex m) { add(edge_mode(cell_kind, a, b, m.i)); });
-    }
-    for (const Index f : mesh.cell_faces(c)) {
-      const EntityShape shape = face_shape(f);
-      const std::array<Index, 4>& frame = face_frame(f);
-      const int a = local(frame[0]), b = local(frame[1]);
-      const int last = local(frame[shape == EntityShape::triangle ? 2 : 3]);
-      order = std::max(order, orders_.faces[f]);
-      node = face_nodes_[f];
-      for_each_mode(shape, orders_.faces[f], [&](ModeIndex m) {
-        add(shape == EntityShape::triangle ? triangle_mode(cell_kind, a, b, last, m.i, m.j)
-                                           : quad_mode(cell_kind, a, b, last, m.i, m.j));
-      });
-    }
-    node = cell_nodes_[c];
-    for_each_mode(entity_shape(cell_kind), orders_.cells[c], [&](ModeIndex m) { add({cell_mode(cell_kind, m)}); });
-
-    std::sort(entries.begin(), entries.end(), [](const CellEntry& x, const CellEntry& y) { return x.mode < y.mode; });
+    const int order = list_entries(*this, c, entries);
     modes.clear();
     for (const CellEntry& entry : entries) {
       modes.push_back(entry.mode);
@@ -215,9 +223,9 @@ void ElementSpace::list_cell_modes() {
       signs_.push_back(entry.sign);
     }
     offsets_.push_back(nodes_.size());
-    const auto [at, added] = known.try_emplace({cell_kind, modes}, static_cast<Index>(num_patterns()));
+    const auto [at, added] = known.try_emplace({kind(c), modes}, static_cast<Index>(num_patterns()));
     if (added) {
-      pattern_kinds_.push_back(cell_kind);
+      pattern_kinds_.push_back(kind(c));
       pattern_orders_.push_back(order);
       pattern_modes_.insert(pattern_modes_.end(), modes.begin(), modes.end());
       pattern_offsets_.push_back(pattern_modes_.size());

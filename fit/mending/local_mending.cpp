@@ -53,6 +53,28 @@ class LocalMender {
   std::vector<std::vector<Index>> faults() const;
   MendingPatch patch_around(const std::vector<Index>& seeds, std::vector<Index>& triangles,
                             std::vector<Index>& vertices, std::vector<Index>& seed_vertices) const;
+  /// Changes of a patch, in order, that were tried.
+  struct Trial {
+    PatchRating rating;  ///< of the patch after them
+    std::vector<MendingChange> changes;
+    friend bool operator<(const Trial& a, const Trial& b) { return a.rating < b.rating; }
+  };
+  /// The patch around a fault, and what was tried there.
+  struct ChangeSearch {
+    MendingPatch patch;
+    std::vector<Index> triangles, vertices;  ///< of the patch, in the surface
+    std::vector<Index> seed_vertices;        ///< of the patch, at the fault
+    std::vector<Vec3> given;                 ///< where the patch's vertices were at first
+    std::vector<Trial> trials;
+    std::size_t work = 0;  ///< as `work_`, at this fault
+
+    const Trial& best() const { return *std::min_element(trials.begin(), trials.end()); }
+  };
+  ChangeSearch search_around(const std::vector<Index>& seeds) const;
+  /// Tries all changes of a patch on which `first` were made.  known: its faults.
+  void try_all(ChangeSearch& search, const PatchFaults& known, const std::vector<MendingChange>& first);
+  /// Tries second changes after the best ones.  known: the faults before any change.
+  void try_pairs(ChangeSearch& search, const PatchFaults& known);
   /// Makes the change at a fault that leaves the fewest; returns false if none helps.
   bool mend(const std::vector<Index>& seeds);
   /// Returns true if `mend` found no change at a fault before, and nothing has changed around it since.
@@ -220,66 +242,67 @@ bool LocalMender::is_hopeless(const std::vector<Index>& seeds) const {
                       [&](const Eigen::AlignedBox3d& box) { return box.intersects(failure.box); });
 }
 
+LocalMender::ChangeSearch LocalMender::search_around(const std::vector<Index>& seeds) const {
+  ChangeSearch search;
+  search.patch = patch_around(seeds, search.triangles, search.vertices, search.seed_vertices);
+  for (const Index v : search.vertices) search.given.push_back(given_[v]);
+  return search;
+}
+
+void LocalMender::try_all(ChangeSearch& search, const PatchFaults& known, const std::vector<MendingChange>& first) {
+  MendingPatch& patch = search.patch;
+  for (const MendingChange& change : possible_changes(patch, search.seed_vertices, search.given, distance_)) {
+    if (is_cancelled() || search.work > kMostWorkAtFault || work_ > kMostMendingWork) return;
+    PatchUndo replaced;
+    if (!patch.apply(change, replaced)) continue;
+    std::vector<MendingChange> all = first;
+    all.push_back(change);
+    double distance = 0;
+    for (const MendingChange& one : all) distance += one.distance;
+    const FaultsAfter after(patch, replaced, known);
+    search.trials.push_back({after.rating(distance, goal_), std::move(all)});
+    patch.undo(replaced);
+    const std::size_t pairs = after.work() + patch.mesh.triangles.size() / kBoxesPerPair;
+    search.work += pairs;
+    work_ += pairs;
+  }
+}
+
+void LocalMender::try_pairs(ChangeSearch& search, const PatchFaults& known) {
+  constexpr std::size_t kBest = 6;  // first changes for which a second one is tried
+  std::vector<Trial>& trials = search.trials;
+  std::stable_sort(trials.begin(), trials.end());
+  const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
+  for (const Trial& trial : first) {
+    PatchUndo replaced;
+    search.patch.apply(trial.changes[0], replaced);
+    try_all(search, FaultsAfter(search.patch, replaced, known).faults(), trial.changes);
+    search.patch.undo(replaced);
+  }
+}
+
 bool LocalMender::mend(const std::vector<Index>& seeds) {
-  constexpr std::size_t kBest = 6;       // first changes for which a second one is tried
   constexpr int kMostPairSearches = 20;  // each takes up to a second on large patches
   if (is_hopeless(seeds)) return false;
-  std::vector<Index> triangles, vertices, seed_vertices;
-  MendingPatch patch = patch_around(seeds, triangles, vertices, seed_vertices);
-  std::vector<Vec3> given;
-  for (const Index v : vertices) given.push_back(given_[v]);
+  ChangeSearch search = search_around(seeds);
+  MendingPatch& patch = search.patch;
   const PatchFaults given_faults = faults_of(patch);
   const PatchRating before = rating_of(given_faults, 0, goal_);
-  struct Trial {
-    PatchRating rating;
-    std::vector<MendingChange> changes;
-  };
-  std::vector<Trial> trials;
-  std::size_t work = 0;  // at this fault
-  const auto try_all = [&](const PatchFaults& known, const std::vector<MendingChange>& first) {
-    for (const MendingChange& change : possible_changes(patch, seed_vertices, given, distance_)) {
-      if (is_cancelled() || work > kMostWorkAtFault || work_ > kMostMendingWork) return;
-      PatchUndo replaced;
-      if (!patch.apply(change, replaced)) continue;
-      std::vector<MendingChange> all = first;
-      all.push_back(change);
-      double distance = 0;
-      for (const MendingChange& one : all) distance += one.distance;
-      const FaultsAfter after(patch, replaced, known);
-      trials.push_back({after.rating(distance, goal_), std::move(all)});
-      patch.undo(replaced);
-      const std::size_t pairs = after.work() + patch.mesh.triangles.size() / kBoxesPerPair;
-      work += pairs;
-      work_ += pairs;
-    }
-  };
-  const auto best = [&] {
-    return std::min_element(trials.begin(), trials.end(),
-                            [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
-  };
-  try_all(given_faults, {});
+  const auto helps = [&] { return search.best().rating.faults < before.faults; };
+  try_all(search, given_faults, {});
   if (is_cancelled()) return false;
-  if (!trials.empty() && best()->rating.faults >= before.faults && num_pair_searches_++ < kMostPairSearches) {
-    std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.rating < b.rating; });
-    const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
-    for (const Trial& trial : first) {
-      PatchUndo replaced;
-      patch.apply(trial.changes[0], replaced);
-      try_all(FaultsAfter(patch, replaced, given_faults).faults(), trial.changes);
-      patch.undo(replaced);
-    }
-  }
+  if (!search.trials.empty() && !helps() && num_pair_searches_++ < kMostPairSearches) try_pairs(search, given_faults);
   if (is_cancelled()) return false;
-  if (trials.empty() || best()->rating.faults >= before.faults) {
+  if (search.trials.empty() || !helps()) {
     failures_[seeds] = {patch.box, changed_.size()};
     return false;
   }
-  const std::vector<MendingChange> chosen = best()->changes;
+  const std::vector<MendingChange> chosen = search.best().changes;
   for (const MendingChange& change : chosen) {
     PatchUndo replaced;
     patch.apply(change, replaced);
   }
-  accept(patch, chosen, triangles, vertices);
+  accept(patch, chosen, search.triangles, search.vertices);
   return true;
 }
 
