@@ -12,9 +12,27 @@ namespace {
 
 /// Linked lists of edges or faces, each kept at the one of its vertices that has the fewest cells. A lookup costs the
 /// length of one list, which is short even next to a vertex that all cells share.
-struct Chains {
-  explicit Chains(std::size_t num_vertices) : head(num_vertices, kNoIndex) {}
-  std::vector<Index> head, next;
+class Chains {
+ public:
+  Chains(const std::vector<Index>& num_cells_at, std::size_t expected)
+      : num_cells_at_(num_cells_at), head_(num_cells_at.size(), kNoIndex) {
+    next_.reserve(expected);
+  }
+  /// Returns the one of two vertices that has fewer cells.
+  Index with_fewer_cells(Index a, Index b) const { return num_cells_at_[b] < num_cells_at_[a] ? b : a; }
+  /// Returns the first item of the list at a vertex; kNoIndex if it is empty.
+  Index first(Index vertex) const { return head_[vertex]; }
+  /// Returns the item that follows another one in its list; kNoIndex after the last.
+  Index after(Index item) const { return next_[item]; }
+  /// Puts an item first in the list at a vertex. Items are added in the order of their numbers.
+  void add(Index vertex, Index item) {
+    next_.push_back(head_[vertex]);
+    head_[vertex] = item;
+  }
+
+ private:
+  const std::vector<Index>& num_cells_at_;
+  std::vector<Index> head_, next_;
 };
 
 std::vector<Index> cells_at_vertices(const VolumeMesh& mesh) {
@@ -44,9 +62,88 @@ std::array<Index, 4> sorted_corners(std::array<Index, 4> corners, int size) {
   return corners;
 }
 
+/// Numbers the edges of cells in the order of their first appearance.
+class EdgeNumbering {
+ public:
+  /// edges, cell_counts  receive the edges and the number of cells around each.
+  EdgeNumbering(const std::vector<Index>& num_cells_at, std::size_t expected, std::vector<std::array<Index, 2>>& edges,
+                std::vector<int>& cell_counts)
+      : edges_(edges), cell_counts_(cell_counts), chains_(num_cells_at, expected) {
+    edges_.reserve(expected);
+    cell_counts_.reserve(expected);
+  }
+  /// Returns the number of the edge between two vertices of a cell, and counts the cell.
+  Index number(Index a, Index b) {
+    if (a > b) std::swap(a, b);
+    const Index hook = chains_.with_fewer_cells(a, b);
+    Index e = chains_.first(hook);
+    while (e != kNoIndex && (edges_[e][0] != a || edges_[e][1] != b)) e = chains_.after(e);
+    if (e == kNoIndex) {
+      e = static_cast<Index>(edges_.size());
+      edges_.push_back({a, b});
+      cell_counts_.push_back(0);
+      chains_.add(hook, e);
+    }
+    ++cell_counts_[e];
+    return e;
+  }
+
+ private:
+  std::vector<std::array<Index, 2>>& edges_;
+  std::vector<int>& cell_counts_;
+  Chains chains_;
+};
+
+/// Numbers the faces of cells in the order of their first appearance.
+class FaceNumbering {
+ public:
+  /// vertices, cells  receive the corners of the faces and the cells on both sides of each.
+  FaceNumbering(const std::vector<Index>& num_cells_at, std::size_t expected,
+                std::vector<std::array<Index, 4>>& vertices, std::vector<std::array<Index, 2>>& cells)
+      : vertices_(vertices), cells_(cells), chains_(num_cells_at, expected) {
+    vertices_.reserve(expected);
+    cells_.reserve(expected);
+    keys_.reserve(expected);
+  }
+  /// Returns the number of a cell's face. corners: `size` of them, then kNoIndex. InputError: two cells have it
+  /// already.
+  Index number(std::array<Index, 4> corners, int size, std::size_t cell) {
+    const std::array<Index, 4> key = sorted_corners(corners, size);
+    Index hook = key[0];
+    for (int j = 1; j < size; ++j) hook = chains_.with_fewer_cells(hook, key[j]);
+    Index f = chains_.first(hook);
+    while (f != kNoIndex && !same_corners(keys_[f], key)) f = chains_.after(f);
+    if (f == kNoIndex) {
+      f = static_cast<Index>(cells_.size());
+      vertices_.push_back(corners);
+      keys_.push_back(key);
+      cells_.push_back({static_cast<Index>(cell), kNoIndex});
+      chains_.add(hook, f);
+    } else {
+      if (cells_[f][1] != kNoIndex)
+        throw InputError("MeshTopology: cell " + std::to_string(cell) +
+                         " has a face that two other cells share already");
+      cells_[f][1] = static_cast<Index>(cell);
+    }
+    return f;
+  }
+
+ private:
+  std::vector<std::array<Index, 4>>& vertices_;
+  std::vector<std::array<Index, 2>>& cells_;
+  std::vector<std::array<Index, 4>> keys_;
+  Chains chains_;
+};
+
 }  // namespace
 
 MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vertices()) {
+  number_edges_and_faces(mesh);
+  list_edges_of_vertices();
+  mark_boundary();
+}
+
+void MeshTopology::number_edges_and_faces(const VolumeMesh& mesh) {
   const std::size_t num_cells = mesh.num_cells();
   cell_edge_offsets_.assign(1, 0);
   cell_face_offsets_.assign(1, 0);
@@ -54,68 +151,23 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
   cell_face_offsets_.reserve(num_cells + 1);
   cell_edges_.reserve(12 * num_cells);  // what hexes need; reserved memory that is not touched costs nothing
   cell_faces_.reserve(6 * num_cells);
-  edges_.reserve(4 * num_cells);
-  edge_cell_counts_.reserve(4 * num_cells);
-  face_vertices_.reserve(4 * num_cells);
-  face_cells_.reserve(4 * num_cells);
-
   const std::vector<Index> num_cells_at = cells_at_vertices(mesh);
-  const auto with_fewer_cells = [&](Index a, Index b) { return num_cells_at[b] < num_cells_at[a] ? b : a; };
-  Chains edge_chains(num_vertices_), face_chains(num_vertices_);
-  std::vector<std::array<Index, 4>> face_keys;
-  face_keys.reserve(4 * num_cells);
-  edge_chains.next.reserve(4 * num_cells);
-  face_chains.next.reserve(4 * num_cells);
+  EdgeNumbering edges(num_cells_at, 4 * num_cells, edges_, edge_cell_counts_);
+  FaceNumbering faces(num_cells_at, 4 * num_cells, face_vertices_, face_cells_);
   for (std::size_t c = 0; c < num_cells; ++c) {
     const CellTopology& topology = cell_topology(mesh.kinds[c]);
     const std::span<const Index> cell = mesh.cell(c);
-
-    for (int i = 0; i < topology.num_edges; ++i) {
-      Index a = cell[topology.edges[i][0]], b = cell[topology.edges[i][1]];
-      if (a > b) std::swap(a, b);
-      const Index hook = with_fewer_cells(a, b);
-      Index e = edge_chains.head[hook];
-      while (e != kNoIndex && (edges_[e][0] != a || edges_[e][1] != b)) e = edge_chains.next[e];
-      if (e == kNoIndex) {
-        e = static_cast<Index>(edges_.size());
-        edges_.push_back({a, b});
-        edge_cell_counts_.push_back(0);
-        edge_chains.next.push_back(edge_chains.head[hook]);
-        edge_chains.head[hook] = e;
-      }
-      ++edge_cell_counts_[e];
-      cell_edges_.push_back(e);
-    }
+    for (int i = 0; i < topology.num_edges; ++i)
+      cell_edges_.push_back(edges.number(cell[topology.edges[i][0]], cell[topology.edges[i][1]]));
     cell_edge_offsets_.push_back(cell_edges_.size());
-
     for (int i = 0; i < topology.num_faces; ++i) {
       const int size = topology.face_sizes[i];
       std::array<Index, 4> corners = {kNoIndex, kNoIndex, kNoIndex, kNoIndex};
       for (int j = 0; j < size; ++j) corners[j] = cell[topology.faces[i][j]];
-      const std::array<Index, 4> key = sorted_corners(corners, size);
-      Index hook = key[0];
-      for (int j = 1; j < size; ++j) hook = with_fewer_cells(hook, key[j]);
-      Index f = face_chains.head[hook];
-      while (f != kNoIndex && !same_corners(face_keys[f], key)) f = face_chains.next[f];
-      if (f == kNoIndex) {
-        f = static_cast<Index>(face_cells_.size());
-        face_vertices_.push_back(corners);
-        face_keys.push_back(key);
-        face_cells_.push_back({static_cast<Index>(c), kNoIndex});
-        face_chains.next.push_back(face_chains.head[hook]);
-        face_chains.head[hook] = f;
-      } else {
-        if (face_cells_[f][1] != kNoIndex)
-          throw InputError("MeshTopology: cell " + std::to_string(c) +
-                           " has a face that two other cells share already");
-        face_cells_[f][1] = static_cast<Index>(c);
-      }
-      cell_faces_.push_back(f);
+      cell_faces_.push_back(faces.number(corners, size, c));
     }
     cell_face_offsets_.push_back(cell_faces_.size());
   }
-  list_edges_of_vertices();
-  mark_boundary();
 }
 
 void MeshTopology::list_edges_of_vertices() {

@@ -53,6 +53,7 @@ class MeshTopology {
   Index find_edge(Index v0, Index v1) const;
 
  private:
+  void number_edges_and_faces(const VolumeMesh& mesh);
   void list_edges_of_vertices();
   void mark_boundary();
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 namespace subvol::internal {
 
@@ -53,6 +52,25 @@ std::vector<double> volumes_of_named_solids(const TriangleMesh& surface) {
     ++num_solids;
   }
   return num_solids > 1 && are_groups_closed(surface) ? volumes : std::vector<double>();
+}
+
+std::optional<SolidSides> solids_at_sides(const TriangleMesh& mesh, std::span<const std::array<Index, 3>> kept,
+                                          std::span<const Index> kept_as) {
+  const std::vector<double> volumes = volumes_of_named_solids(mesh);
+  if (volumes.empty()) return std::nullopt;
+  const auto turned_to_least = [](std::array<Index, 3> t) {
+    std::rotate(t.begin(), std::ranges::min_element(t), t.end());
+    return t;
+  };
+  SolidSides solids(kept.size(), {kNoIndex, kNoIndex});
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Index group = mesh.face_groups.of_face[t];
+    const bool is_turned = turned_to_least(mesh.triangles[t]) != turned_to_least(kept[kept_as[t]]);
+    Index& solid = solids[kept_as[t]][is_turned != (volumes[group] < 0) ? 1 : 0];
+    if (solid != kNoIndex && solid != group) return std::nullopt;
+    solid = group;
+  }
+  return solids;
 }
 
 }  // namespace subvol::internal

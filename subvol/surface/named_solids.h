@@ -3,6 +3,9 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
+#include <optional>
+#include <span>
 #include <vector>
 
 namespace subvol::internal {
@@ -17,5 +20,17 @@ namespace subvol::internal {
 /// returns  the signed volume that each group encloses, negative if it faces inward, 0 for groups without triangles;
 ///          empty if the surface is another one. Cost: a sort of the edges, if there are groups.
 std::vector<double> volumes_of_named_solids(const TriangleMesh& surface);
+
+/// The named solids behind each triangle and in front of it, as places in the list of groups, or kNoIndex.
+using SolidSides = std::vector<std::array<Index, 2>>;
+
+/// Returns the named solids on the sides of triangles without copies; nothing if there are no named solids, or if two
+/// of them are on the same side of a triangle.
+///
+/// mesh     welded, with copies.
+/// kept     its triangles without copies.
+/// kept_as  the number among these of each triangle, or of its copy (`drop_copies`).
+std::optional<SolidSides> solids_at_sides(const TriangleMesh& mesh, std::span<const std::array<Index, 3>> kept,
+                                          std::span<const Index> kept_as);
 
 }  // namespace subvol::internal
