@@ -331,8 +331,8 @@ std::uint8_t vtk_type(CellKind kind, bool is_bezier) {
 }
 
 std::uint8_t vtk_linear_type(CellKind kind) {
-  constexpr std::uint8_t kTypes[] = {10, 13, 12, 14};
-  return kTypes[static_cast<std::size_t>(kind)];
+  constexpr std::uint8_t kVtkLinearTypes[] = {10, 13, 12, 14};
+  return kVtkLinearTypes[static_cast<std::size_t>(kind)];
 }
 
 void turn_wedge(std::int64_t* corners) {

@@ -31,7 +31,6 @@ class OneForOne {
 /// few digits may move a node by a millionth of the cell.
 void compare_nodes(const WrittenFile& file, bool is_rounded, std::span<const Vec3> found, std::span<const Vec3> wanted,
                    std::size_t c) {
-  constexpr double kMostReadBackErrorShare = 1e-6;
   Eigen::AlignedBox3d box;
   for (const Vec3& p : wanted) box.extend(p);
   const double extent = box.sizes().maxCoeff();

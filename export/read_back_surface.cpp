@@ -84,7 +84,6 @@ PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
 
 /// Compares the coordinates of a binary file; those of text are the numbers themselves.
 void compare_binary_stl(const WrittenFile& file, const std::string& bytes, const TriangleMesh& wanted) {
-  constexpr double kMostReadBackErrorShare = 1e-6;  // of the extent
   constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50, kVertexBytes = 12;
   Eigen::AlignedBox3d box;
   for (const auto& triangle : wanted.triangles)

@@ -22,6 +22,9 @@
 
 namespace subvol::internal {
 
+/// Largest difference of coordinates in formats of few digits, relative to the extent of the cell or the surface.
+inline constexpr double kMostReadBackErrorShare = 1e-6;
+
 /// A file that is compared with what was written to it. A difference throws IoError, with the file's name.
 class WrittenFile {
  public:

@@ -12,6 +12,7 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/templates/edge_levels.h"
 
 #include <algorithm>
 #include <functional>
@@ -28,12 +29,11 @@ double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kA
 }  // namespace
 
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
-  // The share for a grid of cubes. For a grid through planes, it is smaller in proportion to the shortest edge.
+  // The share for a grid of cubes. For a grid through planes, whose lines are at least kLeastLineGap apart, it is
+  // smaller in proportion to the shortest edge.
   constexpr double kLeastCubeEdgeShare = 0.1;
-  // Lines of grids through planes are no closer than this share of the others.
-  constexpr double kLeastLineSpacing = 0.4;
   if (grid.num_cells() == 0) return 0;
-  double shortest = kLeastLineSpacing;
+  double shortest = kLeastLineGap;
   for (std::size_t c = 0; c < grid.num_cells(); ++c) {
     const CellTopology& cell = cell_topology(grid.kinds[c]);
     const auto vertices = grid.cell(c);
@@ -42,7 +42,7 @@ double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
       shortest = std::min(shortest, (b - a).norm() / lengths[c].maxCoeff());
     }
   }
-  return kLeastCubeEdgeShare * shortest / kLeastLineSpacing;
+  return kLeastCubeEdgeShare * shortest / kLeastLineGap;
 }
 
 TriangleMesh sheet_triangles(const VolumeMesh& mesh, const MeshTopology& topology,

@@ -86,9 +86,9 @@ class AutomaticFit : AutomaticSolidDriver {
   /// More cells are tried on a surface without edges as long as an aim is missed at all: they cost little there.
   bool is_strict() const { return !follows_.any() && !options_.makes_cage; }
   bool ends_search() const {
-    constexpr double kNearlyAllQuality = 0.95;  // of the quality: what is left is worth no more cells
+    constexpr double kEnoughQualityShare = 0.95;  // of the quality; what is missing is worth no more cells
     return is_good() &&
-           (!is_strict() || (meets_distances(best(), options_) && best().least_share >= kNearlyAllQuality));
+           (!is_strict() || (meets_distances(best(), options_) && best().least_share >= kEnoughQualityShare));
   }
   void take_best();
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
@@ -214,8 +214,8 @@ bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
   // A grid is first asked for this share of the cells allowed, since pads add cells; after a grid that was too large,
-  // the next one is asked for kNextPaddedGridShare of what would have fitted.
-  constexpr double kRoomForPads = 0.5, kNextPaddedGridShare = 0.95;
+  // the next one is asked for kRetryPaddedGridShare of what would have fitted.
+  constexpr double kRoomForPads = 0.5, kRetryPaddedGridShare = 0.95;
   // Share of the edges that must find a path, or a finer grid is worth more than a fit.
   constexpr double kLeastRoutedShare = 0.8;
   constexpr int kTries = 3;  // grids
@@ -229,7 +229,7 @@ bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
     const std::size_t padded = layout_->patched.mesh.num_cells();
     const bool is_least = asked <= static_cast<double>(kLeastTemplateCells);
     if (padded > attempt.template_cells && options_.cells && trial < kTries && !is_least) {
-      asked *= kNextPaddedGridShare * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
+      asked *= kRetryPaddedGridShare * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
     if (!attempt.is_last_count && routed_share(layout_->routing, edges_.features.curves) < kLeastRoutedShare) {

@@ -30,7 +30,6 @@ constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a
 void AutomaticSolidDriver::find_edges() {
   if (!follows_.any()) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
-  constexpr double kNoCreaseAngle = 180;  // no edge is sharper
   std::vector<std::array<Index, 2>> borders;
   if (options_.keeps_groups) borders = group_borders(edges_.mesh, original_);
   const double angle = follows_.sharp ? *options_.crease_angle_degrees : kNoCreaseAngle;
@@ -72,8 +71,8 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template(AutoTemplateOpti
 }
 
 std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::size_t cells) {
-  constexpr int kTries = 3;                    // grids
-  constexpr double kNextTemplateShare = 0.97;  // after a grid that was too large, share of what would have fitted
+  constexpr int kTries = 3;                     // grids
+  constexpr double kRetryTemplateShare = 0.97;  // after a grid that was too large, share of what would have fitted
   double asked = kRoomForTemplates * static_cast<double>(cells);
   std::optional<AutoTemplate> smallest;
   for (int trial = 1;; ++trial) {
@@ -87,7 +86,7 @@ std::optional<AutoTemplate> AutomaticSolidDriver::make_template_of_at_most(std::
     const std::size_t got = made->mesh.num_cells();
     if (!smallest || got < smallest->mesh.num_cells()) smallest = std::move(made);
     if (got <= cells || count == kLeastTemplateCells || trial == kTries) return smallest;
-    asked *= kNextTemplateShare * static_cast<double>(cells) / static_cast<double>(got);
+    asked *= kRetryTemplateShare * static_cast<double>(cells) / static_cast<double>(got);
   }
 }
 

@@ -39,7 +39,6 @@ constexpr double kMostFreedPercent = 50;
 /// Mean distance, in sizes of a boundary face, at which a freed mesh counts as the finest level that its cage could not
 /// reach. Balls and tori of 50 to 4,000 cells have 0.02 to 0.08.
 constexpr double kReachedShare = 0.1;
-constexpr double kNoCreaseAngle = 180;  // no edge is sharper
 
 /// Frees the mesh of one fit: makes the attempts, and puts the best mesh in the place of the fit's.
 class MeshFreeing {

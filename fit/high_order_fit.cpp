@@ -78,7 +78,7 @@ class HighOrderFit : HighOrderDriver {
   void begin_try(const HighOrderTry& attempt);
   std::optional<bool> try_first_orders(const HighOrderTry& attempt, int last);
   Arrival arrival(bool folded, std::size_t stages_begin);
-  void return_to(Arrival& best, int last, std::size_t stages_before);
+  void return_to(Arrival&& best, int last, std::size_t stages_before);
   bool run_order(Approach approach, int order);
   bool run_first_orders(int last);
   bool run_higher_orders();
@@ -138,7 +138,8 @@ HighOrderFit::Arrival HighOrderFit::arrival(bool folded, std::size_t stages_begi
 
 /// Makes an arrival the present state, and leaves the stages of other attempts out of the report, which had
 /// `stages_before` stages before the first one. Allocates nothing.
-void HighOrderFit::return_to(Arrival& best, int last, std::size_t stages_before) {
+/// last: the order that the arrival has.
+void HighOrderFit::return_to(Arrival&& best, int last, std::size_t stages_before) {
   mesh_ = std::move(best.mesh);
   ideal_boxes_ = std::move(best.ideal_boxes);
   points_ = std::move(best.points);
@@ -163,11 +164,11 @@ bool HighOrderFit::run_first_orders(int last) {
     try {
       folded = try_first_orders(attempt, last);
     } catch (const std::bad_alloc&) {
-      if (best) return_to(*best, last, stages_before);
+      if (best) return_to(*std::move(best), last, stages_before);
       throw;
     }
     if (!folded) {
-      if (best) return_to(*best, last, stages_before);
+      if (best) return_to(*std::move(best), last, stages_before);
       return false;
     }
     if (schedule_.tries.size() == 1) return true;
@@ -177,7 +178,7 @@ bool HighOrderFit::run_first_orders(int last) {
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (!best->folded && fair) break;
   }
-  return_to(*best, last, stages_before);
+  return_to(*std::move(best), last, stages_before);
   set_orders(EntityOrders(mesh_.space.orders()));
   return true;
 }

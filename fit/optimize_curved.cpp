@@ -284,7 +284,6 @@ void CurvedOptimizer::finish() {
 }
 
 CurvedOptimizeResult CurvedOptimizer::run(const HighOrderMesh& original) {
-  constexpr double kLeastJacobianGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const QualityReport start = measure();
   quality_ = start;
   const bool was_valid = start.certificate.not_certified.empty();

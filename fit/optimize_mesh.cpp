@@ -208,7 +208,6 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 /// Returns true if a result is better than a start whose cells are all certified: closer to a surface that the start
 /// was too far from, or of better cells at distances that are within the tolerances or no larger.
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
-  constexpr double kLeastJacobianGain = 1e-6;  // of the least scaled Jacobian; less is rounding
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
   if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||

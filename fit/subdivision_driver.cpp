@@ -157,7 +157,7 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
 /// Makes the level's start valid by continuation from the linear split L of the level below:
 ///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionDriver::start_level() {
-  constexpr int kMostContinuationRounds = 60;  // of a continuation, to bound the time
+  constexpr int kMostContinuationRounds = 60;  // to bound the time
   // Factor on the gain of t until it is feasible, the least gain that counts, and the share of the rest below which the
   // gain is slow: then lambda rises.
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;

@@ -209,7 +209,7 @@ std::size_t ColumnPlanes::num_columns() const {
 void ColumnPlanes::release(Index column) { of_column_[column] = {kNoIndex, kNoIndex}; }
 
 Mat3 ColumnPlanes::projector(std::span<const Index> columns) const {
-  constexpr double kSameColumnPlaneSine = 1e-6;  // sine of the angle below which two planes are one
+  constexpr double kSameColumnPlaneSine = 1e-6;  // below it, two planes are one
   if (planes_.empty() || columns.empty()) return Mat3::Identity();
   std::array<Index, 2> common = of_column_[columns[0]];
   for (const Index column : columns)

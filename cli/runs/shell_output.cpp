@@ -135,7 +135,7 @@ std::vector<double> first_heights(const ShellResult& shell, std::size_t first) {
 std::optional<std::string> inward_warning(const TriangleMesh& surface) {
   // In front of a face the winding number is 0 if the surface faces outward, and -1 if it faces inward; for a surface
   // that encloses nothing it lies in between. Small holes hardly change it.
-  constexpr double kInwardWindingNumber = -0.9;
+  constexpr double kMostInwardWindingNumber = -0.9;
   constexpr std::size_t kMostProbedFaces = 2000;
   constexpr double kFaceProbeOffset = 1e-3;  // relative to a face's size
   const std::size_t n = surface.triangles.size(), step = (n + kMostProbedFaces - 1) / kMostProbedFaces;
@@ -152,7 +152,7 @@ std::optional<std::string> inward_warning(const TriangleMesh& surface) {
   if (points.empty()) return std::nullopt;
   const std::vector<double> numbers = WindingNumber(surface).at(points);
   const double area = std::accumulate(areas.begin(), areas.end(), 0.0);
-  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kInwardWindingNumber * area)
+  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kMostInwardWindingNumber * area)
     return std::nullopt;
   const SoupTopology edges = soup_topology(surface.positions, surface.triangles);
   const bool is_closed = edges.open_edges == 0 && edges.crowded_edges == 0;

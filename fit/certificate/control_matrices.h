@@ -24,6 +24,12 @@ inline constexpr double kMostNarrow = 1e20;
 /// Single precision is not used if the longest column of the mean is at least this many times the shortest.
 inline constexpr double kMostScale = 1e3;
 
+/// Models may have errors of at most this share of the lowest det J, or of a good one if that is lower, with det J
+/// relative to the cell's mean determinant.
+inline constexpr double kModelErrorShare = 0.1;
+/// Least error of models that is asked for, relative to the mean edges.
+inline constexpr double kLeastModelError = 1e-9;
+
 template <class Vector>
 using NumberOf = std::remove_cvref_t<decltype(Vector{}[0])>;
 

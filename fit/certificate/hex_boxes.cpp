@@ -20,7 +20,7 @@ constexpr int kMostKept = 64;
 
 // Model errors may be at most kModelErrorShare * min(lowest det J, kGoodHexDeterminant), with det J relative to the
 // cell's mean determinant.
-constexpr double kModelErrorShare = 0.1, kGoodHexDeterminant = 0.5;
+constexpr double kGoodHexDeterminant = 0.5;
 
 /// 1 for those of the first kWide entries of a matrix, stored by columns, that belong to the column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
@@ -276,8 +276,7 @@ double HexBoxes::narrow_error_size(const Box& box) const {
 }
 
 std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
-  // Least error that is asked for, and the share of the error allowed that single precision may use up.
-  constexpr double kLeastModelError = 1e-9, kNarrowShare = 0.25;
+  constexpr double kNarrowShare = 0.25;  // of the error allowed, which single precision may use up
   if (lowest != -std::numeric_limits<double>::infinity())
     box.wanted =
         std::max(kModelErrorShare * std::min(lowest / mean_edges_.prod(), kGoodHexDeterminant), kLeastModelError);

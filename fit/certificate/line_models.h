@@ -20,7 +20,7 @@ namespace subvol::internal {
 /// largest.
 class LineModels {
  public:
-  static constexpr int kMostModelDegree = 8, kMaxLevel = 12;  // of the models; bisections of the line
+  static constexpr int kMostModelDegree = 8, kMaxLevel = 12;  // bisections of the line
   static constexpr int kStride = 16;  ///< distance from one function's coefficients to the next; unused entries are 0
   using PerFunction = std::array<double, (kMaxOrder + 1 + 7) / 8 * 8>;  ///< padded with zeros to whole vectors
 

@@ -249,7 +249,7 @@ bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
 double SimplexBoxes::wanted_error(double lowest) const {
   // The error may be kModelErrorShare of the lowest determinant, at most of kGoodSimplexDeterminant, relative to the
   // cell's mean determinant.
-  constexpr double kModelErrorShare = 0.1, kGoodSimplexDeterminant = 0.3, kLeastModelError = 1e-9;
+  constexpr double kGoodSimplexDeterminant = 0.3;
   if (lowest == -std::numeric_limits<double>::infinity()) return small_error_;
   return std::max(kModelErrorShare * std::min(lowest, kGoodSimplexDeterminant), kLeastModelError);
 }

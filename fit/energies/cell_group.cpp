@@ -71,7 +71,7 @@ void CellGroup::make_prism_tables(Basis basis, QuadratureRule rule, const LinePr
   num_triangle_functions = numbers.size();
   const Quadrature layer = make_triangle_quadrature(rule, points_per_direction);
   triangle_functions.resize(layer.points.size() * num_triangle_functions);
-  std::vector<std::array<double, 6>> means(num_triangle_functions, std::array<double, 6>{});  // by kPairs
+  std::vector<std::array<double, 6>> means(num_triangle_functions, std::array<double, 6>{});  // by kDirectionPairs
   ShapeFunctions functions(kind, basis, order);
   for (std::size_t q = 0; q < layer.points.size(); ++q) {
     functions.set_point(layer.points[q]);
@@ -79,7 +79,8 @@ void CellGroup::make_prism_tables(Basis basis, QuadratureRule rule, const LinePr
       Vec3& f = triangle_functions[q * num_triangle_functions + number];
       const double value = functions.value(mode, f);
       f[2] = value;
-      for (int p = 0; p < 6; ++p) means[number][p] += layer.weights[q] * f[kPairs[p][0]] * f[kPairs[p][1]];
+      for (int p = 0; p < 6; ++p)
+        means[number][p] += layer.weights[q] * f[kDirectionPairs[p][0]] * f[kDirectionPairs[p][1]];
     }
   }
   const auto& [vv, vd, dd] = line;
@@ -87,7 +88,7 @@ void CellGroup::make_prism_tables(Basis basis, QuadratureRule rule, const LinePr
   for (std::size_t a = 0; a < num_modes; ++a) {
     const std::array<double, 6>& mean = means[triangle_function[a]];
     for (int p = 0; p < 6; ++p) {
-      const int along_w = (kPairs[p][0] == 2) + (kPairs[p][1] == 2);
+      const int along_w = (kDirectionPairs[p][0] == 2) + (kDirectionPairs[p][1] == 2);
       const std::vector<double>& factor = along_w == 0 ? vv : along_w == 1 ? vd : dd;
       products[a][p] = mean[p] * factor[modes[a].k];
     }
@@ -105,7 +106,8 @@ void CellGroup::make_tet_tables(Basis basis, QuadratureRule rule) {
       Vec3 gradient;
       functions.value(modes[a], gradient);
       if (!expands) gradients.push_back(gradient);
-      for (int p = 0; p < 6; ++p) products[a][p] += weights[q] * gradient[kPairs[p][0]] * gradient[kPairs[p][1]];
+      for (int p = 0; p < 6; ++p)
+        products[a][p] += weights[q] * gradient[kDirectionPairs[p][0]] * gradient[kDirectionPairs[p][1]];
     }
   }
   if (!expands) return;

@@ -31,7 +31,7 @@ struct CellGroup {
   std::vector<std::size_t> triangle_function;
   std::vector<Vec3> triangle_functions;
   std::size_t num_triangle_functions = 0;
-  std::vector<std::array<double, 6>> products;  ///< per mode: mean of d_c N d_d N, by kPairs
+  std::vector<std::array<double, 6>> products;  ///< per mode: mean of d_c N d_d N, by kDirectionPairs
 
   std::vector<std::array<Index, kSimdLanes>> batches;  ///< cell numbers; the last batch is padded with repeats
   std::vector<int> active;                             ///< number of cells in each batch without padding

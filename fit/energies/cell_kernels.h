@@ -59,8 +59,7 @@ inline void premultiply(const double (*b)[kSimdLanes], double (*v)[kSimdLanes]) 
 template <bool kCoupled>
 void add_point_hessian(std::span<const ElementRule::Entry> entries, const DistortionBatch& batch,
                        const double (*inverse_h)[kSimdLanes], const double* weight, double (*k)[9][kSimdLanes]) {
-  constexpr int kPairs = kMaxCellVertices;
-  alignas(64) double w[kPairs][3][kSimdLanes];
+  alignas(64) double w[kMaxCellVertices][3][kSimdLanes];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (int i = 0; i < 3; ++i)
 #pragma omp simd
@@ -116,7 +115,6 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
 
 /// Evaluates one of the distortions at kDistortionPointsAtOnce points.
 struct DistortionKernel {
-  static constexpr int kDistortionPointsAtOnce = 2;  // the rotation of one need not wait for that of the other
   using Batch = DistortionBatch;
   Batch batches[kDistortionPointsAtOnce];
   const DistortionKernels& kernels;

@@ -9,6 +9,8 @@ namespace subvol::internal {
 
 /// Default floor to which the eigenvalues of a distortion's second derivative are raised (dimensionless).
 inline constexpr double kHessianFloor = 0.01;
+/// Batches that are worth passing to a kernel at once: the rotation of one need not wait for that of the other.
+inline constexpr int kDistortionPointsAtOnce = 2;
 
 /// Distortion energies of kSimdLanes Jacobians, lane by lane, with their derivatives.
 ///

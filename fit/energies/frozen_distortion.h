@@ -15,7 +15,7 @@ namespace subvol::internal {
 inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
 inline constexpr int kMostFrozen = frozen_size(true);
 /// Pairs of directions in the order of symmetric 3x3 blocks: (0,0) (1,1) (2,2) (0,1) (1,2) (2,0).
-inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+inline constexpr int kDirectionPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
 
 /// Writes a point's numbers to `frozen`. `weight` multiplies the second derivative.
 template <bool kCoupled>
@@ -87,7 +87,7 @@ template <bool kCoupled>
 [[gnu::always_inline]] inline void add_blocks(const Wide* frozen, Wide* blocks) {
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
   for (int pair = 0; pair < 6; ++pair) {
-    const Wide *a = rv + 3 * kPairs[pair][0], *b = rv + 3 * kPairs[pair][1];
+    const Wide *a = rv + 3 * kDirectionPairs[pair][0], *b = rv + 3 * kDirectionPairs[pair][1];
     Wide z[9], t[9], k[9];
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;

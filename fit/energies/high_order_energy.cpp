@@ -224,7 +224,6 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate_with(std::span<const Vec3> nodes, const Kernel& kernel,
                                        const PerPoint& per_point) const {
-  constexpr int kDistortionPointsAtOnce = 2;  // the rotation of one need not wait for that of the other
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
            const CellGroup& group = groups_[g];
            const double hinge = hinge_weight_at(group);
@@ -303,7 +302,7 @@ void HighOrderEnergy::freeze_hinge(CellGroup& group, std::size_t batch, std::siz
   keep_frozen(slope, 9, &group.frozen_hinges[9 * (batch * group.num_points() + q)]);
   Wide* blocks = &group.mean_blocks[54 * batch];
   for (int pair = 0; pair < 6; ++pair) {
-    const auto [c, d] = kPairs[pair];
+    const auto [c, d] = kDirectionPairs[pair];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) {
         blocks[9 * pair + 3 * i + k] += slope[3 * i + c] * slope[3 * k + d];

@@ -19,9 +19,9 @@ Occupied occupied_by_corners(const RoutingGraph& graph, const CornerPlacement& c
 
 /// Moves vertices of corners out of the way of curves that no path follows otherwise, the longest curves first: the
 /// ends of small features may lie on the only path along a long edge. Corners that cannot move share the vertex of the
-/// curve's end if they may. Returns false if none was moved.
+/// curve's end if they may. Returns false if no corner moves or shares a vertex.
 ///
-/// search  among these corners; it forgets the curves of those that are moved.
+/// search  among these corners; it forgets the curves of corners whose vertex changes.
 bool clear_ways_of_curves(const RoutingTask& task, CornerPlacement& corners, CurveSearch& search);
 
 /// Lets the corners around the ends of lost curves share vertices. Returns false if none may. A search among these

@@ -33,9 +33,6 @@ class CurveSearch {
   CurveSearch(const CurveSearch&) = delete;
   CurveSearch& operator=(const CurveSearch&) = delete;
 
-  /// Returns true if an open curve ends at a corner without a vertex.
-  bool lacks_corner(Index c) const;
-
   /// Looks for a path of a curve that touches nothing occupied but its corners.
   std::optional<Found> find(Index c, const Occupied& occupied);
 
@@ -71,6 +68,8 @@ class CurveSearch {
     std::vector<CurveWalk> legs;
   };
 
+  /// Returns true if an open curve ends at a corner without a vertex.
+  bool lacks_corner(Index c) const;
   std::vector<Course>& courses(Index c);
   Course straight_course(Index c) const;
   Course course_by_middle(Index c) const;

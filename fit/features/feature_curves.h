@@ -12,6 +12,8 @@ namespace subvol {
 
 /// Default angle in degrees: sharper edges are features.
 inline constexpr double kUsualCreaseAngle = 40;
+/// Angle in degrees that no edge exceeds: with it, no edge is sharp by its angle.
+inline constexpr double kNoCreaseAngle = 180;
 
 /// A polyline along sharp edges of a surface. It is closed if the first vertex is repeated at the end.
 struct FeatureCurve {

@@ -63,12 +63,11 @@ std::size_t divide(const MeshTopology& topology, const SheetFaces& sheets, std::
 }  // namespace
 
 SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angle_degrees) {
-  constexpr double kMostBendAngle = 180;                             // degrees; no bend is above it
   constexpr double kSheetJunctionAngle = 90, kFlatSheetAngle = 180;  // degrees
   SheetCurves result;
   const std::vector<std::array<Index, 2>> junctions = curve_edges(target);
   SignedFeatures& features = result.features;
-  features.curves = feature_curves(target.mesh, angle_degrees.value_or(kMostBendAngle), junctions);
+  features.curves = feature_curves(target.mesh, angle_degrees.value_or(kNoCreaseAngle), junctions);
   std::set<std::array<Index, 2>> on_curves;
   for (const FeatureCurve& curve : features.curves.curves) {
     const auto [low, high] = std::minmax(curve.vertices[0], curve.vertices[1]);

@@ -25,8 +25,8 @@ std::vector<Vec3> missed_points(const TargetSurface& target, const ClosestPoint&
 
 std::optional<SizedMesh> graded_template(const TriangleMesh& surface, const VoxelGrid& grid, std::span<const char> kept,
                                          std::span<const Vec3> places, std::size_t most_cells, SearchStop& stop) {
-  constexpr double kFewerPlacesShare = 0.6;  // share of the places that are left if there was no room for them
-  for (auto count = static_cast<double>(places.size()); count >= 1 && !stop.is_stopped(); count *= kFewerPlacesShare) {
+  constexpr double kRetryPlacesShare = 0.6;  // share of the places that is tried next if there was no room for them
+  for (auto count = static_cast<double>(places.size()); count >= 1 && !stop.is_stopped(); count *= kRetryPlacesShare) {
     const std::vector<char> cut = cells_around_points(grid, places.first(static_cast<std::size_t>(count)));
     GradedGrid graded = graded_grid(surface, grid, kept, cut, &stop);
     if (stop.is_stopped()) break;

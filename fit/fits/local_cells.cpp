@@ -56,9 +56,10 @@ Vec3 cell_center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::s
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells, SearchStop* stop) {
   // A row of cells that is cut adds about a hundred cells for each of its own, a block of them 26.
-  constexpr double kLeastAdded = 26, kFewerCutCellsShare = 0.7;
+  constexpr double kLeastAdded = 26;
+  constexpr double kRetryCutCellsShare = 0.7;  // share of the cells that is tried next
   const double room = static_cast<double>(most_cells) - static_cast<double>(mesh.num_cells());
-  for (double most = room / kLeastAdded; most >= 1; most *= kFewerCutCellsShare) {
+  for (double most = room / kLeastAdded; most >= 1; most *= kRetryCutCellsShare) {
     std::vector<char> chosen(mesh.num_cells(), 0);
     most = std::min(most, static_cast<double>(choose(faults, most, chosen)));
     if (most < 1 || (stop && stop->is_stopped())) break;

@@ -13,8 +13,6 @@ namespace {
 constexpr std::size_t kBranch = kWide;
 constexpr int kMaxLevels = 12;      // 8^12 boxes
 constexpr double kFarAway = 1e200;  // coordinate in unused lanes; its square is infinite
-// By rounding, a box may be farther than a site in it: the slack keeps the result independent of the bound.
-constexpr double kSquaredDistanceSlack = 1 + 1e-14;
 
 int longest_axis(std::span<const Vec3> sites, std::span<const Index> order) {
   Vec3 low = sites[order[0]], high = low;

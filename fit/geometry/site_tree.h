@@ -11,6 +11,10 @@
 
 namespace subvol::internal {
 
+/// Factor on squared distances that covers their rounding. By rounding, a box may be farther than a site in it: the
+/// slack keeps the result independent of the bound.
+inline constexpr double kSquaredDistanceSlack = 1 + 1e-14;
+
 /// Finds the nearest of a set of sites, with a tree of bounding boxes: eight children per box, eight sites per leaf.
 ///
 /// Sites are ordered so that every 8^k in a row lie close together, so the tree needs no pointers: box b of a level

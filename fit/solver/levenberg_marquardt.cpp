@@ -26,14 +26,14 @@ constexpr int kMostTrials = 8;             // of a step, each with a larger mu: 
 
 /// Returns the cells whose energy rises most, as few as account for half of all rises.
 std::vector<Index> most_risen(std::span<const double> before, std::span<const double> after) {
-  constexpr double kMostRisenShare = 0.5;
+  constexpr double kExplainedRiseShare = 0.5;
   std::vector<Index> cells;
   const auto rise = [&](Index c) { return after[c] - before[c]; };
   double rest = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
     const auto c = static_cast<Index>(i);
     if (!(rise(c) > 0)) continue;
-    rest += kMostRisenShare * rise(c);
+    rest += kExplainedRiseShare * rise(c);
     cells.push_back(c);
   }
   std::ranges::stable_sort(cells, std::greater{}, rise);
@@ -80,7 +80,7 @@ LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Ve
 
 void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> diagonal) {
   // Share of the mean of the diagonal. A degree of freedom without energy must not make the matrix singular.
-  constexpr double kLeastHessianDiagonal = 1e-12;
+  constexpr double kAddedDiagonalShare = 1e-12;
   std::vector<double> added(diagonal.size());
   double mean = 0;
   for (std::size_t j = 0; j < diagonal.size(); ++j) mean += added[j] = diagonal[j].trace() / 3;
@@ -88,7 +88,7 @@ void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> 
   std::vector<Mat3> damped(diagonal.begin(), diagonal.end());
   for (std::size_t j = 0; j < added.size(); ++j) {
     added[j] =
-        std::min(kMostDamping, damping_ * local_damping_[j]) * 0.5 * (added[j] + mean) + kLeastHessianDiagonal * mean;
+        std::min(kMostDamping, damping_ * local_damping_[j]) * 0.5 * (added[j] + mean) + kAddedDiagonalShare * mean;
     damped[j].diagonal().array() += added[j];
   }
   inverse_diagonal_ = inverse_blocks(damped);

@@ -336,7 +336,8 @@ bool QualityStages::relax(std::span<const Index> centers, int rings, const Quali
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
   constexpr int kLiftRoundSteps = 2, kLiftPatience = 5;  // of a round; rounds without a better state
-  constexpr double kMostPoorShareLeft = 0.7;             // a round of the whole mesh must leave fewer of the poor cells
+  // Share of the poor cells; a round of the whole mesh must leave fewer than that
+  constexpr double kMostPoorShareLeft = 0.7;
   const bool is_patch = patch_mesh_ != nullptr;
   // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:
   // joint129 at level 2 rises to 0.21 by such patches, but to 0.65 if the whole mesh is lifted as long as that helps.

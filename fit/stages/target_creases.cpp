@@ -14,7 +14,6 @@ FollowedCreases creases_along_target(const FitTarget& target, const CreaseRule& 
   if (target.surface.is_cloud()) return {};
   std::vector<std::array<Index, 2>> borders;
   if (rule.keeps_groups) borders = group_borders(target.mesh, target.mesh);
-  constexpr double kNoCreaseAngle = 180;  // no edge is sharper
   std::optional<double> angle = rule.angle_degrees;
   if (!rule.follows_all_edges &&
       (!template_mesh.tags.creases.empty() || !has_edges_to_follow(target.mesh, angle, rule.follows_all_edges)))

@@ -18,9 +18,9 @@ class WorkShare {
   /// part before is over, whatever its forecast was.
   /// forecast  work that the part is expected to take, > 0, in any unit.
   void begin_part(double end, double forecast) {
-    constexpr double kLeastWorkPart = 0.1;  // of the work that is left
+    constexpr double kOverduePartShare = 0.1;  // of the work that is left, for a part whose end is passed already
     begin_ = end_;
-    end_ = end > begin_ ? std::min(end, 1.0) : begin_ + kLeastWorkPart * (1 - begin_);
+    end_ = end > begin_ ? std::min(end, 1.0) : begin_ + kOverduePartShare * (1 - begin_);
     forecast_ = forecast;
     done_ = 0;
   }

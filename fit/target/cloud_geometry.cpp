@@ -16,9 +16,9 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kNeighbors = 16;               // of a point, for its normal and its area (docs/fitting.md)
-constexpr double kLeastSquaredRadiusShare = 1e-20;   // of diagonal^2 (k + 1) / n, floor of the radius of a search
-constexpr double kSquaredDistanceSlack = 1 + 1e-14;  // the tree sums squared distances in another order
+constexpr std::size_t kNeighbors = 16;  // of a point, for its normal and its area (docs/fitting.md)
+// Floor of a squared search radius, as a share of diagonal^2 (k + 1) / n
+constexpr double kLeastSquaredRadiusShare = 1e-20;
 
 /// A point of the tree with its distance from the query point.
 struct Neighbor {
@@ -47,6 +47,7 @@ class NeighborSearch {
         if (other != place) found_.push_back({(tree_.position(other) - center).squaredNorm(), other});
       std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
       found_.resize(k_);
+      // The tree sums squared distances in another order.
       if (found_.back().squared_distance * kSquaredDistanceSlack <= squared_radius) break;
     }
     squared_radius = std::max({2 * found_.back().squared_distance, 1e-12 * squared_radius, least_});

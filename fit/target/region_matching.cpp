@@ -64,7 +64,7 @@ bool has_cavity(const VolumeMesh& mesh) {
 
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh,
                                            const std::function<bool()>& cancelled) {
-  constexpr double kInsideWindingNumber = 0.5;  // halfway between outside, 0, and inside, 1
+  constexpr double kLeastInsideWindingNumber = 0.5;  // from here on a point is inside: halfway between 0 and 1
   const std::vector<int> references = region_references(mesh);
   if (references.size() < 2) return std::nullopt;
   std::optional<RegionSurface> regions = find_so_many_regions(target, references.size(), cancelled);
@@ -80,7 +80,7 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
   for (std::size_t r = 0; r < boundaries.size(); ++r) {
     const std::vector<double> inside = WindingNumber(boundaries[r]).at(centers);
     for (std::size_t c = 0; c < centers.size(); ++c)
-      if (inside[c] > kInsideWindingNumber) ++votes[{mesh.references[c], regions->regions[r].number}];
+      if (inside[c] > kLeastInsideWindingNumber) ++votes[{mesh.references[c], regions->regions[r].number}];
   }
   std::map<int, int> reference_of = one_to_one(votes);
   if (reference_of.size() != references.size()) return std::nullopt;

@@ -28,8 +28,7 @@ using namespace internal;
 
 namespace {
 
-/// Halfway between outside, 0, and inside, 1.
-constexpr double kInsideWindingNumber = 0.5;
+constexpr double kLeastInsideWindingNumber = 0.5;  // from here on a point is inside: halfway between 0 and 1
 
 /// Finds the voxels inside a surface.
 class InsideVoxels {
@@ -118,9 +117,9 @@ bool InsideVoxels::find() {
       for (std::size_t b = first; b < end; ++b) {
         const double number = winding[b - first];
         const bool is_clear =
-            hits[b - first].distance >= kAway * radius && std::abs(number - kInsideWindingNumber) >= kClear;
+            hits[b - first].distance >= kAway * radius && std::abs(number - kLeastInsideWindingNumber) >= kClear;
         if (size == 1 || is_clear)
-          label(blocks[b], size, number >= kInsideWindingNumber);
+          label(blocks[b], size, number >= kLeastInsideWindingNumber);
         else
           add_halves(blocks[b], size, parts);
       }

@@ -454,8 +454,8 @@ class VtkParser {
 
 /// The VTK type of a linear cell, and the place in it of each of our corners; each of these orders is its own inverse.
 int vtk_linear_type(CellKind kind) {
-  constexpr int kTypes[] = {10, 13, 12, 14};
-  return kTypes[static_cast<std::size_t>(kind)];
+  constexpr int kVtkLinearTypes[] = {10, 13, 12, 14};
+  return kVtkLinearTypes[static_cast<std::size_t>(kind)];
 }
 std::size_t vtk_corner(CellKind kind, std::size_t i) {
   constexpr std::array<std::size_t, 6> kWedge{0, 2, 1, 3, 5, 4};  // the normal of 0 1 2 points away from 3 4 5

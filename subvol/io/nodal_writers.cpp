@@ -72,11 +72,13 @@ void append_set(std::string& text, const Numbers& numbers) {
 }
 
 void append_inp_elements(std::string& text, const NodalMesh& mesh, int order) {
-  constexpr const char* kTypes[2][kNumCellKinds] = {{"C3D4", "C3D6", "C3D8", "C3D5"}, {"C3D10", "C3D15", "C3D20"}};
+  constexpr const char* kInpElementTypes[2][kNumCellKinds] = {{"C3D4", "C3D6", "C3D8", "C3D5"},
+                                                              {"C3D10", "C3D15", "C3D20"}};
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const CellKind kind = mesh.kinds[c];
     if (c == 0 || mesh.kinds[c - 1] != kind)
-      text += std::string("*ELEMENT, TYPE=") + kTypes[order - 1][static_cast<std::size_t>(kind)] + ", ELSET=EALL\n";
+      text += std::string("*ELEMENT, TYPE=") + kInpElementTypes[order - 1][static_cast<std::size_t>(kind)] +
+              ", ELSET=EALL\n";
     text += std::to_string(c + 1);
     const auto nodes = mesh.cell(c).first(num_edge_nodes(kind, order));
     for (std::size_t i = 0; i < nodes.size(); ++i) {

@@ -34,7 +34,7 @@ class TriangleFaces {
   std::vector<std::pair<FaceKey, Index>> triangles_;
 };
 
-/// Finds boundary quads that stand against two boundary triangles.
+/// Finds boundary quads, half of which is a boundary triangle of another cell.
 void check_quads(const MeshTopology& topology, const TriangleFaces& triangles, DefectList& defects) {
   for (const Index f : topology.boundary_faces()) {
     const auto quad = topology.face(f);

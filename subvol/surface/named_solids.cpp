@@ -34,7 +34,6 @@ bool are_groups_closed(const TriangleMesh& surface) {
 }  // namespace
 
 std::vector<double> volumes_of_named_solids(const TriangleMesh& surface) {
-  constexpr double kRoundingVolumeShare = 1e-9;  // of the area to the power of 3/2
   const FaceGroups& groups = surface.face_groups;
   if (groups.groups.size() < 2 || std::ranges::find(groups.of_face, kNoIndex) != groups.of_face.end()) return {};
   std::vector<double> volumes(groups.groups.size(), 0.0), areas(volumes.size(), 0.0);

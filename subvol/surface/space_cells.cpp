@@ -141,10 +141,7 @@ void place_parts(const TriangleMesh& mesh, SpaceCells& space) {
 
 }  // namespace
 
-bool SpaceCell::has_volume() const {
-  constexpr double kRoundingVolumeShare = 1e-9;  // of the area to the power of 3/2
-  return volume > kRoundingVolumeShare * area * std::sqrt(area);
-}
+bool SpaceCell::has_volume() const { return volume > kRoundingVolumeShare * area * std::sqrt(area); }
 
 double SpaceCells::facing(std::size_t part) const {
   const double whole = -cells[parts[part].outer].volume;

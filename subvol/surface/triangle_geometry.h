@@ -11,6 +11,9 @@
 
 namespace subvol::internal {
 
+/// Share of the area of a closed surface, to the power of 3/2, up to which its volume may be rounding.
+inline constexpr double kRoundingVolumeShare = 1e-9;
+
 /// Returns the cross product of two sides of a triangle: twice its area long, along its normal.
 inline Vec3 doubled_area_vector(const TriangleMesh& mesh, const std::array<Index, 3>& triangle) {
   const auto& [a, b, c] = triangle;

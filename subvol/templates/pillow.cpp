@@ -29,7 +29,7 @@ namespace {
 // With less than 1/6, no cell of a mesh of equal cubes can be inverted: each edge keeps more than half its length in
 // its own direction.
 constexpr double kPillowStepShare = 0.15;
-constexpr double kPillowSamePlaneCosine = 0.99;  // cosine above which two faces count as one plane
+constexpr double kPillowSamePlaneCosine = 0.99;  // above it, two faces count as one plane
 
 std::vector<char> marked(const VolumeMesh& mesh, std::span<const Index> cells) {
   std::vector<char> in_set(mesh.num_cells(), cells.empty());

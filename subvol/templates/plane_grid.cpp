@@ -211,7 +211,7 @@ class PlaneChoice {
   }
 
  private:
-  static constexpr double kPlaneSamplesPerSize = 4;  // per size of a cell
+  static constexpr double kPlaneSamplesPerSize = 4;  // of a cell
 
   bool close(std::size_t low, std::size_t high) const {
     return planes_[high]->position - planes_[low]->position < least_gap_;

@@ -172,8 +172,9 @@ bool VoxelLabels::is_simple(Index cell, int label) {
     else if (found[i] != label)
       masks[others++] = mask;
   }
-  constexpr std::size_t kMostLabelsAround = 6;  // one cell; more are not worth a look
-  if (others > kMostLabelsAround) return false;
+  // Besides the old and the new label; a cell with more keeps its label
+  constexpr std::size_t kMostOtherLabelsAround = 6;
+  if (others > kMostOtherLabelsAround) return false;
   for (std::uint32_t subset = 0; subset < 1u << others; ++subset) {
     std::uint32_t neighbors = of_old;
     for (std::size_t i = 0; i < others; ++i)
