@@ -92,7 +92,7 @@ void print_energy(const ElementSpace& space, const std::vector<Vec3>& nodes, int
 /// Shares of a cell's edge by which modes are random.
 constexpr double kAmplitudes[] = {0.05, 0.1, 0.2};
 /// Passes that take so many microseconds are not repeated.
-constexpr double kMostRepeatedMicroseconds = 2e6;
+constexpr double kLongestRepeatedPassMicroseconds = 2e6;
 
 void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double gradient_us_per_cell) {
   const double cells = static_cast<double>(mesh.num_cells());
@@ -100,7 +100,7 @@ void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double
     const std::vector<Vec3> nodes = random_modes(space, mesh, amplitude);
     CertificateSummary summary;
     const double first = best_cpu_microseconds(1, [&] { certify(space, nodes); }) / cells;
-    const double time = best_cpu_microseconds(first * cells > kMostRepeatedMicroseconds ? 1 : 5,
+    const double time = best_cpu_microseconds(first * cells > kLongestRepeatedPassMicroseconds ? 1 : 5,
                                               [&] { summary = certify(space, nodes); }) /
                         cells;
     std::printf(

@@ -16,7 +16,7 @@ namespace subvol {
 using namespace internal;
 namespace {
 
-constexpr double kVanishes = 1e-13;  // relative to the largest coefficient
+constexpr double kVanishingModeShare = 1e-13;  // relative to the largest coefficient
 
 /// A point of a patch in the face's cell: the corners of the patch are one corner of the face, two midpoints of edges,
 /// and the center.
@@ -68,7 +68,7 @@ HighOrderPatches::Face HighOrderPatches::make_face(const HighOrderMesh& mesh, In
   const auto nodes = space.nodes(c);
   const auto signs = space.signs(c);
   for (std::size_t a = 0; a < modes.size(); ++a) {
-    if (std::abs(at.value(modes[a])) < kVanishes) continue;
+    if (std::abs(at.value(modes[a])) < kVanishingModeShare) continue;
     face.modes.push_back(modes[a]);
     face.coefficients.push_back(signs[a] * mesh.coefficients[nodes[a]]);
   }

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kBetweenSamples = 16.0 / 15;  // the largest value of a quadratic over a triangle, relative to that at
                                                // quarter points
-constexpr double kAlike = 0.7;                 // ratio of errors above which two ways to cut count as equally good
+constexpr double kEqualCutsRatio = 0.7;        // ratio of errors above which two ways to cut count as equally good
 constexpr int kShortestStripInterval = kCellSteps;  // quads have samples between their corners
 
 /// An interval of a strip that should be halved to improve a quad.
@@ -57,7 +57,7 @@ class PatchJudge {
         const bool may[2] = {can_halve(0, i), can_halve(1, j)};
         const double if_u = error_with(kCellSteps / 2, kCellSteps), if_v = error_with(kCellSteps, kCellSteps / 2);
         const double better = std::min(if_u, if_v), worse = std::max(if_u, if_v);
-        const bool both = better > max_chord_error && better > kAlike * worse;
+        const bool both = better > max_chord_error && better > kEqualCutsRatio * worse;
         if (may[0] && (both || if_u <= if_v || !may[1])) state.wishes.push_back({strips_[0], i, error});
         if (may[1] && (both || if_v < if_u || !may[0])) state.wishes.push_back({strips_[1], j, error});
       }

@@ -13,7 +13,7 @@ namespace subvol {
 using namespace internal;
 namespace {
 
-constexpr double kCancelled = 1e-6;  // a sum of unit normals this short has no direction
+constexpr double kCancelledNormalLength = 1e-6;  // a sum of unit normals this short has no direction
 
 bool is_hard(const SurfaceTopology& quads, Index h) {
   return quads.edge_sharpness[quads.corner_edges[h]] >= static_cast<float>(kInfiniteSharpness);
@@ -165,7 +165,7 @@ void finish_normals(TessellatedSurface& surface) {
     }
   for (std::size_t v = 0; v < facets.size(); ++v) {
     Vec3& normal = surface.normals[v];
-    const bool is_missing = normal.norm() < kCancelled;
+    const bool is_missing = normal.norm() < kCancelledNormalLength;
     normal = (is_missing ? facets[v] : normal).normalized();
     if (normal == Vec3::Zero()) normal = Vec3::UnitZ();
     if (normal.dot(facets[v]) < 0) normal = -normal;

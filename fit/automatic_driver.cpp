@@ -173,7 +173,7 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
   constexpr int kMostRelaxationRounds = 12, kRelaxationSteps = 6;  // steps of each round
-  constexpr int kFruitless = 4;  // rounds without fewer hopeless cells: no success was seen after two
+  constexpr int kMostFruitlessRounds = 4;  // rounds without fewer hopeless cells: no success was seen after two
   constexpr double kFirstSurfaceWeight = 10, kSurfaceWeightFactor = 0.1;  // factor from one round to the next
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
   double surface = kFirstSurfaceWeight;
@@ -186,7 +186,7 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
     }
     fruitless = cells.size() < fewest ? 0 : fruitless + 1;
     fewest = std::min(fewest, cells.size());
-    if (cells.empty() || fruitless == kFruitless) break;
+    if (cells.empty() || fruitless == kMostFruitlessRounds) break;
     if (!relaxed_at_) relaxed_at_ = target_.normalization.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
     const std::vector<Vec3> before = unknowns();

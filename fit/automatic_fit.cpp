@@ -54,7 +54,7 @@ constexpr std::array kOtherFreeGrids{1.0, 0.87};
 /// Largest number of long edges that the first grid may lose. Of five parts that lost more, no other grid lost none.
 constexpr std::size_t kMostLongLost = 2;
 /// Share of the area on planes from which on grids that are not through them are worse.
-constexpr double kMany = 0.4;
+constexpr double kMostAlignedShare = 0.4;
 
 /// An automatic fit of one solid: the search among templates.
 class AutomaticFit : AutomaticSolidDriver {
@@ -79,7 +79,7 @@ class AutomaticFit : AutomaticSolidDriver {
   bool route_and_fit(const AutomaticFitTrial& described);
   bool is_worth_trying(const AutomaticAttempt& attempt) const {
     // A grid without planes is the grid of the attempt before.
-    return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
+    return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMostAlignedShare);
   }
   /// Number of cells up to which a fit is refined, if the number is free.
   static double most_refined_cells() { return kMostRefinementGrowth * static_cast<double>(kAutomaticCells.back()); }
@@ -193,7 +193,7 @@ bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells
   using Kind = AutomaticAttempt::Kind;
   std::vector<std::pair<Kind, double>> others;
   for (const double share : kOtherGrids) others.emplace_back(Kind::aligned, share);
-  if (aligned_share_ >= kMany)  // else an attempt with such a grid follows
+  if (aligned_share_ >= kMostAlignedShare)  // else an attempt with such a grid follows
     for (const double share : kOtherFreeGrids) others.emplace_back(Kind::edges, share);
   std::set<std::pair<Kind, std::size_t>> seen{{Kind::aligned, first.template_cells}};
   std::size_t num_grids = 1;

@@ -209,12 +209,12 @@ bool AutomaticSolidDriver::judge(AutomaticFitTrial trial) {
 }
 
 std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
-  constexpr double kMeets = 1;  // a cell that meets another one is worse than any cell of poor quality
+  constexpr double kMeetingCellFault = 1;  // a cell that meets another one is worse than any cell of poor quality
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
     faults.push_back(std::max(0.0, kAcceptableQuality - least));
   if (may_meet)
-    for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
+    for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeetingCellFault;
   return cage_ ? cage_->sums_of_parts(faults) : faults;
 }
 

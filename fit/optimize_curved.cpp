@@ -10,6 +10,7 @@
 #include "subvol/fit/fits/cell_lift.h"
 #include "subvol/fit/fits/sheet_projectors.h"
 #include "subvol/fit/high_order_patch.h"
+#include "subvol/fit/optimize_driver.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/fit_problem.h"

@@ -27,6 +27,9 @@ namespace subvol::internal {
 /// Largest relative change of a region's volume at which interfaces may slide.
 inline constexpr double kMostVolumeChange = 1e-3;
 
+/// Least rise of the least or the mean scaled Jacobian that is a gain; less is rounding.
+inline constexpr double kLeastJacobianGain = 1e-6;
+
 /// Weight of tangential differences in correspondences.
 inline constexpr double kOptimizeTangentialWeight = 0.003;
 

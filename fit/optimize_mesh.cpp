@@ -59,7 +59,7 @@ struct Progress {
 /// Returns a warning about groups of faces inside regions, if some have left their planes: nothing holds these.
 std::optional<std::string> inner_groups_warning(const VolumeMesh& before, const VolumeMesh& after,
                                                 const MeshTopology& topology, double diagonal) {
-  constexpr double kTold = 1e-6;  // of the diagonal
+  constexpr double kLeastReportedMove = 1e-6;  // of the diagonal
   const auto reference = [&](Index cell) { return before.references.empty() ? 0 : before.references[cell]; };
   double most = 0;
   Index moved = kNoIndex;
@@ -75,7 +75,7 @@ std::optional<std::string> inner_groups_warning(const VolumeMesh& before, const 
     for (const Index v : corners)
       if (const double way = std::abs(normal.dot(after.positions[v] - x[v])); way > most) most = way, moved = group;
   }
-  if (most <= kTold * diagonal) return std::nullopt;
+  if (most <= kLeastReportedMove * diagonal) return std::nullopt;
   const Group& group = before.face_groups.groups[moved];
   return formatted(
       "faces of the group %s inside the mesh left their planes by up to %.3g %% of the diagonal: only the "
@@ -166,14 +166,15 @@ bool MeshOptimizer::untangle_all() {
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
-  // Ideal boxes and weights change after kImproveRoundSteps steps: more steps toward those of before are lost.
-  constexpr int kFirstSteps = 4, kImproveRoundSteps = 2, kMostImproveRounds = 14;
+  // Ideal boxes and weights change after kImprovementRoundSteps steps: more steps toward those of before are lost.
+  constexpr int kFirstImprovementSteps = 4, kImprovementRoundSteps = 2, kMostImprovementRounds = 14;
   constexpr double kLeastShareOfLambda = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
-  runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kImproveRoundSteps * kMostImproveRounds / 2);
-  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstSteps)) return false;
-  for (int round = 0; round < kMostImproveRounds; ++round) {
+  runner_.work().begin_part(kShareAfterRounds,
+                            kFirstImprovementSteps + kImprovementRoundSteps * kMostImprovementRounds / 2);
+  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstImprovementSteps)) return false;
+  for (int round = 0; round < kMostImprovementRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kCornerPoints).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
     const bool too_far = mean_percent_ > kMeanShareOfTolerance * options_.mean_tolerance_percent ||
@@ -192,7 +193,7 @@ bool MeshOptimizer::improve() {
       if (minima[c] < releases_below_) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
-    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kImproveRoundSteps)) return false;
+    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kImprovementRoundSteps)) return false;
   }
   return true;
 }
@@ -223,15 +224,15 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
 /// Raises the least scaled Jacobian toward a goal; if the surface suffers, it counts more in another attempt. Returns
 /// false if the work must end.
 bool MeshOptimizer::raise_quality(double goal) {
-  constexpr double kMoreSurface = 10;  // factor on the weight of the surface in the second attempt
-  constexpr int kAttempts = 2;         // with the weight of the surface as it is, and with kMoreSurface times that
+  constexpr double kMoreSurface = 10;        // factor on the weight of the surface in the second attempt
+  constexpr int kSurfaceWeightAttempts = 2;  // with its weight as it is, and with kMoreSurface times that
   const Measured before = measure();
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
   QualitySchedule schedule = fine_quality_schedule(goal);
   runner_.work().begin_portion(kFirstQualityPortion, 1, schedule.expected_steps());
   schedule.most_distance = std::max(kMaxShareOfTolerance * options_.max_tolerance_percent, before.max_percent) / 100;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kSurfaceWeightAttempts; ++attempt) {
     const std::size_t stages_before = report_.stages.size();
     const bool going = run_quality_stages(schedule);
     if (is_better(measure(), before)) return going;
@@ -247,11 +248,11 @@ bool MeshOptimizer::raise_quality(double goal) {
 /// Raises the least scaled Jacobian to the quality that was asked for and then, from there, beyond it. Returns false if
 /// the work must end.
 bool MeshOptimizer::raise_quality() {
-  constexpr double kBeyond = 0.1;  // scaled Jacobian that is asked for beyond the aim, once that is reached
+  constexpr double kQualityBeyondAim = 0.1;  // scaled Jacobian that is asked for beyond the aim, once that is reached
   if (options_.quality == 0) return true;
   if (!raise_quality(options_.quality)) return false;
   if (measure_quality(mesh_).min_scaled_jacobian < options_.quality) return true;
-  return raise_quality(std::min(kMostQuality, options_.quality + kBeyond));
+  return raise_quality(std::min(kMostQuality, options_.quality + kQualityBeyondAim));
 }
 
 /// Makes flat faces exactly so, unless the boundary is fixed. least_jacobian: of the start.

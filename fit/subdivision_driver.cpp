@@ -260,7 +260,7 @@ bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional
   // way first, because the stages before put it as near as they could. If no mean rises, largest distances may rise by
   // 10 %: so joint129 at level 2 rises from 0.08 to 0.62 while its mean distance falls by 2 % and its largest one, at a
   // single place, rises by 7 %.
-  constexpr double kFarther = 1.05, kNearerFarther = 1.25, kFartherPlace = 1.1;
+  constexpr double kMostDistanceFactor = 1.05, kMostNearerDistanceFactor = 1.25, kMostFarthestPlaceFactor = 1.1;
   double farthest_mean_before = 0, farthest_max_before = 0;
   bool no_mean_rises = true;
   for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -269,14 +269,14 @@ bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional
     no_mean_rises = no_mean_rises && distances[i].mean() <= before.distances[i].mean();
   }
   const auto most = [](double distance, double farthest, double factor) {
-    return std::max(factor * distance, std::min(kNearerFarther * distance, farthest));
+    return std::max(factor * distance, std::min(kMostNearerDistanceFactor * distance, farthest));
   };
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
     const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
-    if (misses || mean > most(mean_before, farthest_mean_before, kFarther) ||
-        distances[i].max() >
-            most(before.distances[i].max(), farthest_max_before, no_mean_rises ? kFartherPlace : kFarther))
+    if (misses || mean > most(mean_before, farthest_mean_before, kMostDistanceFactor) ||
+        distances[i].max() > most(before.distances[i].max(), farthest_max_before,
+                                  no_mean_rises ? kMostFarthestPlaceFactor : kMostDistanceFactor))
       return false;
   }
   return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;

@@ -49,6 +49,7 @@ auto orders_shown(std::vector<int> EntityOrders::*orders_of) {
 
 using HighOrderClass = py::class_<CurvedMesh, std::shared_ptr<CurvedMesh>>;
 
+/// Adds the properties that describe the nodes, the basis and the orders.
 void add_nodes_and_orders(HighOrderClass& type) {
   type.def_property_readonly(
       "coefficients",
@@ -65,6 +66,7 @@ void add_nodes_and_orders(HighOrderClass& type) {
   type.def_property_readonly("cell_orders", orders_shown(&EntityOrders::cells), "Of each cell: (n,) int32. A view.");
 }
 
+/// Adds the properties that describe references, groups and regions.
 void add_regions(HighOrderClass& type) {
   type.def_property_readonly(
       "references",
@@ -85,7 +87,7 @@ void add_regions(HighOrderClass& type) {
       "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
 }
 
-/// What is known at points inside the cells.
+/// Adds the methods that return positions at points of the cells.
 void add_positions(HighOrderClass& type) {
   type.def(
       "point_map",
@@ -105,7 +107,7 @@ void add_positions(HighOrderClass& type) {
       "evaluate($self, cells, points)\n--\n\nPositions at points of cells: (n, 3). Arguments as of point_map.");
 }
 
-/// What makes other meshes of this one.
+/// Adds the methods that return other meshes.
 void add_other_meshes(HighOrderClass& type) {
   type.def(
       "straight_sided",

@@ -172,6 +172,7 @@ std::string volume_text(const VolumeMesh& mesh) {
 
 using VolumeClass = py::class_<VolumeMesh, std::shared_ptr<VolumeMesh>>;
 
+/// Adds the properties that show the arrays of cells.
 void add_cell_arrays(VolumeClass& type) {
   for (const auto& [kind, plural] : kCellKindNames)
     type.def_property_readonly(
@@ -317,10 +318,52 @@ py::array faces_of(const py::object& self, std::size_t corners) {
   return py::array(array.attr("reshape")(rows, columns));
 }
 
+using SurfaceClass = py::class_<SurfaceMesh, std::shared_ptr<SurfaceMesh>>;
+
+/// Adds the properties that show the arrays of faces.
+void add_face_arrays(SurfaceClass& type) {
+  type.def_property_readonly(
+      "triangles", [](const py::object& self) { return faces_of(self, 3); },
+      "Point numbers of the faces of three corners: (n, 3) int32. A view where these follow one another.");
+  type.def_property_readonly(
+      "quads", [](const py::object& self) { return faces_of(self, 4); },
+      "Point numbers of the faces of four corners: (n, 4) int32. A view where these follow one another.");
+  type.def_property_readonly(
+      "face_points",
+      [](const py::object& self) {
+        const auto& points = self.cast<const SurfaceMesh&>().polygons.face_vertices;
+        return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
+      },
+      "Point numbers of all faces, one after another: int32. A view.");
+  type.def_property_readonly(
+      "face_offsets",
+      [](const py::object& self) { return shown_offsets(self.cast<const SurfaceMesh&>().polygons.face_offsets, self); },
+      "Where each face begins in face_points, and the end: (n + 1,) int64. A view.");
+}
+
+/// Adds the properties that describe the groups of faces.
+void add_surface_groups(SurfaceClass& type) {
+  type.def_property_readonly(
+      "group_names", [](const SurfaceMesh& mesh) { return names_of(mesh.polygons.face_groups.groups); }, kNamesHelp);
+  type.def_property_readonly(
+      "group_numbers",
+      [](const py::object& self) {
+        return numbers_of(self.cast<const SurfaceMesh&>().polygons.face_groups.groups, self);
+      },
+      kNumbersHelp);
+  type.def_property_readonly(
+      "face_groups",
+      [](const py::object& self) {
+        const auto& places = self.cast<const SurfaceMesh&>().polygons.face_groups.of_face;
+        return shown(places.data(), {static_cast<py::ssize_t>(places.size())}, self);
+      },
+      "Place of each face's group in group_names, -1 for none: (n,) int32; without entries where there are no groups. "
+      "A view.");
+}
+
 void add_surface_mesh(py::module_& module) {
-  py::class_<SurfaceMesh, std::shared_ptr<SurfaceMesh>> type(
-      module, "SurfaceMesh",
-      R"(A surface of triangles, quads and larger polygons: closed or not, a soup or not.
+  SurfaceClass type(module, "SurfaceMesh",
+                    R"(A surface of triangles, quads and larger polygons: closed or not, a soup or not.
 
 points        (n, 3) numbers
 triangles     (n, 3) point numbers, quads (n, 4); or any polygons:
@@ -340,43 +383,9 @@ Takes the arrays named above.)");
       "points",
       [](const py::object& self) { return shown_points(self.cast<const SurfaceMesh&>().polygons.positions, self); },
       "(n, 3) float64. A view that can be written.");
-  type.def_property_readonly(
-      "triangles", [](const py::object& self) { return faces_of(self, 3); },
-      "Point numbers of the faces of three corners: (n, 3) int32. A view where these follow one "
-      "another.");
-  type.def_property_readonly(
-      "quads", [](const py::object& self) { return faces_of(self, 4); },
-      "Point numbers of the faces of four corners: (n, 4) int32. A view where these follow one "
-      "another.");
-  type.def_property_readonly(
-      "face_points",
-      [](const py::object& self) {
-        const auto& points = self.cast<const SurfaceMesh&>().polygons.face_vertices;
-        return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);
-      },
-      "Point numbers of all faces, one after another: int32. A view.");
-  type.def_property_readonly(
-      "face_offsets",
-      [](const py::object& self) { return shown_offsets(self.cast<const SurfaceMesh&>().polygons.face_offsets, self); },
-      "Where each face begins in face_points, and the end: (n + 1,) int64. A view.");
+  add_face_arrays(type);
   add_tags(type);
-  type.def_property_readonly(
-      "group_names", [](const SurfaceMesh& mesh) { return names_of(mesh.polygons.face_groups.groups); }, kNamesHelp);
-  type.def_property_readonly(
-      "group_numbers",
-      [](const py::object& self) {
-        return numbers_of(self.cast<const SurfaceMesh&>().polygons.face_groups.groups, self);
-      },
-      kNumbersHelp);
-  type.def_property_readonly(
-      "face_groups",
-      [](const py::object& self) {
-        const auto& places = self.cast<const SurfaceMesh&>().polygons.face_groups.of_face;
-        return shown(places.data(), {static_cast<py::ssize_t>(places.size())}, self);
-      },
-      "Place of each face's group in group_names, -1 for none: (n,) int32; without entries where there are no groups. "
-      "A "
-      "view.");
+  add_surface_groups(type);
   type.def(
       "triangulated",
       [](const SurfaceMesh& mesh) {

@@ -228,7 +228,7 @@ MeshPointer make_split(const py::object& object, const py::kwargs& given) {
   });
 }
 
-/// What makes a mesh of a surface, a box or a grid.
+/// Adds the functions that make a mesh of a surface, a box or a grid.
 void add_makers(py::module_& group) {
   group.def("auto", &make_auto, py::arg("target"),
             R"(auto(target, *, cells=300, pillow=False, progress=None, threads=None)
@@ -262,7 +262,7 @@ Stacks hexes and prisms on the faces of a surface, along its normals or a direct
 thickness  length of all layers together)");
 }
 
-/// What changes the cells of a mesh.
+/// Adds the functions that change the cells of a mesh.
 void add_edits(py::module_& group) {
   group.def("pillow", &make_pillowed, py::arg("mesh"),
             R"(pillow(mesh, *, list=None)

@@ -118,11 +118,11 @@ std::optional<BorderPlane> FlatBorders::plane_of_run(const Run& run) const {
 }
 
 std::size_t FlatBorders::num_stretches(const Run& piece) const {
-  constexpr double kStraight = 1e-2;  // sine of the largest turn in a straight stretch
+  constexpr double kStraightTurnSine = 1e-2;  // sine of the largest turn in a straight stretch
   std::size_t count = 1;
   Vec3 start = way(piece.front());
   for (const Index h : piece) {
-    if (start.cross(way(h)).norm() <= kStraight) continue;
+    if (start.cross(way(h)).norm() <= kStraightTurnSine) continue;
     start = way(h);
     ++count;
   }

@@ -67,8 +67,8 @@ std::string defects_of(const Json& report) {
 }
 
 bool is_sent_from_outside(int signal) {
-  constexpr std::array<int, 6> kSent{SIGKILL, SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGXCPU};
-  return std::find(kSent.begin(), kSent.end(), signal) != kSent.end();
+  constexpr std::array<int, 6> kSignalsFromOutside{SIGKILL, SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGXCPU};
+  return std::find(kSignalsFromOutside.begin(), kSignalsFromOutside.end(), signal) != kSignalsFromOutside.end();
 }
 
 Verdict judge_signal(int signal) {

@@ -153,10 +153,10 @@ void hold_to_quality(std::optional<double> least, const MeshCheck& found, FitRep
 }
 
 std::vector<std::string> warnings_of_quality(double aim, const MeshCheck& found) {
-  constexpr double kReached = 0.01;  // a fit ends at an aim that is rounded
+  constexpr double kReachedAimTolerance = 0.01;  // a fit ends at an aim that is rounded
   if (aim == 0 || !found.quality || found.quality->worst_cells.empty()) return {};
   const QualityReport& quality = *found.quality;
-  if (quality.min_scaled_jacobian >= aim - kReached) return {};
+  if (quality.min_scaled_jacobian >= aim - kReachedAimTolerance) return {};
   const auto poor = std::ranges::count_if(quality.cell_minima, [&](double least) { return least < aim; });
   const Vec3& place = quality.worst_cells.front().center;
   return {formatted(

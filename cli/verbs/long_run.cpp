@@ -25,8 +25,8 @@ void LongRun::prepare(const std::vector<Part>& parts) {
 }
 
 bool LongRun::precedes_result(std::string_view stage) {
-  constexpr std::string_view kEarly[] = {"template", "directions", "thickness", "start"};
-  return std::find(std::begin(kEarly), std::end(kEarly), stage) != std::end(kEarly);
+  constexpr std::string_view kEarlyStages[] = {"template", "directions", "thickness", "start"};
+  return std::find(std::begin(kEarlyStages), std::end(kEarlyStages), stage) != std::end(kEarlyStages);
 }
 
 void LongRun::tell_warnings() {

@@ -17,7 +17,7 @@ namespace subvol::cli {
 using namespace internal;
 namespace {
 
-/// What the boundary is to be like, and the sizes of the cells.
+/// Adds the options that tell what the boundary is to be like, and the sizes of the cells.
 void add_boundary_options(CLI::App& verb, OptimizeArguments& arguments) {
   OptimizeOptions& optimize = arguments.optimize;
   CLI::Option* target = verb.add_option("--target", arguments.target,
@@ -38,7 +38,7 @@ void add_boundary_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->capture_default_str();
 }
 
-/// What is aimed at, and how it is weighed.
+/// Adds the options that set aims and weigh them.
 void add_goal_options(CLI::App& verb, OptimizeOptions& optimize) {
   verb.add_option("--tolerance", optimize.mean_tolerance_percent,
                   "Mean distance from the surface to keep within, in percent of the diagonal of its bounding box;\n"
@@ -62,7 +62,7 @@ void add_goal_options(CLI::App& verb, OptimizeOptions& optimize) {
       ->capture_default_str();
 }
 
-/// How long it may take.
+/// Adds the options that limit steps and time.
 void add_optimize_limits(CLI::App& verb, OptimizeOptions& optimize) {
   verb.add_option("--max-iterations", optimize.control.max_iterations,
                   "Steps per stage (default: as many as the schedule asks for)")
@@ -74,7 +74,7 @@ void add_optimize_limits(CLI::App& verb, OptimizeOptions& optimize) {
       ->type_name("SECONDS");
 }
 
-/// To be called last: these options need some of the others, and exclude some.
+/// Adds the options of curved cells. Call it last: they need and exclude options that exist by then.
 void add_curved_element_options(CLI::App& verb, OptimizeArguments& arguments) {
   const auto group = "Curved elements";
   CLI::Option* order =

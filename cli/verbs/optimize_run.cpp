@@ -146,14 +146,14 @@ Json OptimizeRun::report() const {
 }
 
 void OptimizeRun::summarize() const {
-  constexpr std::size_t kMostNamedUnprovedCells = 10;
+  constexpr std::size_t kMostNamedUncertifiedCells = 10;
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
             << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min "
             << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
             << to_text(mesh_check_);
   if (result_.report.creases) std::cerr << to_text(*result_.report.creases);
   const std::vector<Index> left = not_certified_cells(mesh_check_);
-  for (std::size_t i = 0; i < std::min(left.size(), kMostNamedUnprovedCells); ++i)
+  for (std::size_t i = 0; i < std::min(left.size(), kMostNamedUncertifiedCells); ++i)
     std::cerr << "cell " << left[i] << " is not proved positive\n";
   tell_outputs();
 }

@@ -312,7 +312,7 @@ int ShellRun::run() {
   return of_shell == kDone ? polynomial_cells_status(polynomials_) : of_shell;
 }
 
-/// How thick the layers are.
+/// Adds the options that set the thickness and number of the layers.
 void add_thickness_options(CLI::App& verb, ShellArguments& arguments) {
   ShellOptions& shell = arguments.shell;
   verb.add_option("--thickness", arguments.thickness,
@@ -338,7 +338,7 @@ void add_thickness_options(CLI::App& verb, ShellArguments& arguments) {
       ->type_name("H");
 }
 
-/// Where on the surface the layers grow, and to which side.
+/// Adds the options that tell where on the surface the layers grow, and to which side.
 void add_surface_options(CLI::App& verb, ShellArguments& arguments) {
   verb.add_option("--region", arguments.region,
                   "Grow on the boundary of this region of SURFACE, which may be a mesh of cells: its name or number\n"
@@ -360,7 +360,7 @@ void add_surface_options(CLI::App& verb, ShellArguments& arguments) {
       ->capture_default_str();
 }
 
-/// How the columns of cells stand on the surface, and what they keep of it.
+/// Adds the options that tell how columns of cells stand on the surface, and what they keep of it.
 void add_column_options(CLI::App& verb, ShellArguments& arguments) {
   verb.add_flag("--free-surface", arguments.shell.free_surface,
                 "Let the surface's vertices slide along it for better cells; its border and creases stay");
@@ -371,6 +371,7 @@ void add_column_options(CLI::App& verb, ShellArguments& arguments) {
       ->type_name("DEGREES");
 }
 
+/// Adds the options of curved cells.
 void add_curved_layer_options(CLI::App& verb, ShellArguments& arguments) {
   CLI::Option* order = verb.add_option("--order", arguments.order,
                                        "Order of the cells; above 1 they are curved, but for the surface itself")
@@ -385,7 +386,7 @@ void add_curved_layer_options(CLI::App& verb, ShellArguments& arguments) {
   add_map_tolerance(verb, arguments.writing)->needs(order);
 }
 
-/// How long it may take.
+/// Adds the options that limit steps and time.
 void add_shell_limits(CLI::App& verb, ShellOptions& shell) {
   verb.add_option("--max-iterations", shell.control.max_iterations, "Steps per solve (default: 60)")
       ->check(whole_number_in(1, 1'000'000))

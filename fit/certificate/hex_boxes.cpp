@@ -229,14 +229,14 @@ double HexBoxes::choose_models(Box& box) {
 void HexBoxes::choose_split(Box& box) {
   // Contractions along u cost least, and neighboring boxes share those along w, and along w and v. So a bisection along
   // w that is needed anyway comes first.
-  constexpr double kNeeded = 0.3;
-  constexpr double kCost[3] = {0.9, 1, 1.1};
+  constexpr double kNeededVariation = 0.3;
+  constexpr double kSplitCosts[3] = {0.9, 1, 1.1};
   const bool is_looked_at = has_coefficients(box);
   box.split = -1;
   Vec3 variation = Vec3::Zero();
   for (int d = 2; d >= 0; --d) {
     variation[d] = error_size(box, d);
-    if (!is_looked_at && box.split < 0 && variation[d] > kNeeded && box.levels[d] < LineModels::kMaxLevel)
+    if (!is_looked_at && box.split < 0 && variation[d] > kNeededVariation && box.levels[d] < LineModels::kMaxLevel)
       box.split = d;
   }
   if (box.split >= 0) return;
@@ -249,7 +249,7 @@ void HexBoxes::choose_split(Box& box) {
   }
   for (int d = 0; d < 3; ++d)
     if (box.levels[d] < LineModels::kMaxLevel &&
-        (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
+        (box.split < 0 || variation[d] * kSplitCosts[box.split] > variation[box.split] * kSplitCosts[d]))
       box.split = d;
   if (box.split < 0) box.split = 0;  // no direction can be bisected further
   if (pool_.num_taken() > kMostKept) box.coefficients.reset();

@@ -128,7 +128,7 @@ class HexBoxes {
   static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
   void find_coefficients(Box& box);
   struct RowSums;
-  /// Makes the weights and `is_used_`, for each row of J from `RowSums` of it.
+  /// Makes the weights and `is_used_`, row by row of J, from its `RowSums`.
   void make_weights();
   void sum_modes(int row, int first, const RowSums& sums);
   void make_mode_weights_along_u(int row, int first, const RowSums& sums);

@@ -12,7 +12,7 @@ namespace subvol::internal {
 namespace {
 
 /// Number of columns contracted at a time if lanes run along the result's direction.
-constexpr int kSome = 5;
+constexpr int kColumnsAtOnce = 5;
 
 /// Degrees of the models along u and w, ascending: those that take the least time (measured).
 std::vector<int> model_degrees(Basis basis, int order) {
@@ -83,19 +83,19 @@ void contract(int num_out, const Number* table, const Lines<Number>& in, const N
 }
 
 /// out[i out_stride], lane p, = more[i] + c in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n; c is the weight
-/// of the function 1 (`Of`). Reads up to kSome numbers, and writes as many vectors, beyond the end.
+/// of the function 1 (`Of`). Reads up to kColumnsAtOnce numbers, and writes as many vectors, beyond the end.
 template <Of of, class Vector>
 void contract_to_lanes(const NumberOf<Vector>* table, const NumberOf<Vector>* in, int n, const Vector* more,
                        Vector* out, int out_stride) {
-  for (int i = 0; i < n; i += kSome) {
-    Vector sums[kSome] = {};
+  for (int i = 0; i < n; i += kColumnsAtOnce) {
+    Vector sums[kColumnsAtOnce] = {};
     if (of == Of::values)
-      for (int s = 0; s < kSome; ++s) sums[s] += in[i + s];
+      for (int s = 0; s < kColumnsAtOnce; ++s) sums[s] += in[i + s];
     for (int j = 1; j < n; ++j) {
       const Vector x = load<Vector>(table + j * LineModels::kStride);
-      for (int s = 0; s < kSome; ++s) sums[s] += in[j * n + i + s] * x;
+      for (int s = 0; s < kColumnsAtOnce; ++s) sums[s] += in[j * n + i + s] * x;
     }
-    for (int s = 0; s < kSome; ++s) out[(i + s) * out_stride] = sums[s] + more[i + s];
+    for (int s = 0; s < kColumnsAtOnce; ++s) out[(i + s) * out_stride] = sums[s] + more[i + s];
   }
 }
 
@@ -125,7 +125,7 @@ HexContraction::HexContraction(Basis basis, int order)
   std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
 
   // With room for what is read or written beyond the end.
-  const std::size_t most = tiers_[0].back()->degree() + 1, row = row_ + kRow, lines = n_ + kSome;
+  const std::size_t most = tiers_[0].back()->degree() + 1, row = row_ + kRow, lines = n_ + kColumnsAtOnce;
   modes_.assign(n_ * row, 0);
   after_w_.assign(most * row, 0);
   narrow_modes_.assign(n_ * row, 0);

@@ -158,8 +158,9 @@ class BoxSearch {
 
   void keep(Box box, double lowest) {
     boxes_.choose_split(box);
-    constexpr double kCalm = 0.1;  // share of the mean det J below which the lowest box comes first
-    open_.push_back({lowest, -std::min(lowest, kCalm * boxes_.mean_determinant()), num_kept_++, std::move(box)});
+    constexpr double kUrgentDeterminantShare = 0.1;  // share of the mean det J below which the lowest box comes first
+    open_.push_back(
+        {lowest, -std::min(lowest, kUrgentDeterminantShare * boxes_.mean_determinant()), num_kept_++, std::move(box)});
     std::push_heap(open_.begin(), open_.end());
   }
 

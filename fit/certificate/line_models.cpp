@@ -79,11 +79,12 @@ const LineModels& LineModels::get(Basis basis, int order, int degree) {
 
 LineModels::LineModels(Basis basis, int order, int degree) : basis_(basis), order_(order), degree_(degree) {
   bounds_[0] = bounds_[1] = slope_bounds_[0] = slope_bounds_[1] = 1;
-  constexpr double kUp = 1 + 1e-14;  // more than the rounding of the bounds
+  constexpr double kRoundingUp = 1 + 1e-14;  // more than the rounding of the bounds
   for (int i = 1; i < order; ++i) {
     const bool fourier = basis == Basis::fourier;
-    bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : largest_integrated_legendre(i));
-    slope_bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 : std::sqrt(2 * i + 1.0));
+    bounds_[i + 1] =
+        kRoundingUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : largest_integrated_legendre(i));
+    slope_bounds_[i + 1] = kRoundingUp * (fourier ? std::numbers::sqrt2 : std::sqrt(2 * i + 1.0));
   }
 }
 

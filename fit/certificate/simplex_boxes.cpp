@@ -14,8 +14,8 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr std::size_t kFour = SimplexTables::kControlPointLanes;
-using FourDoubles = double __attribute__((vector_size(kFour * sizeof(double))));
+constexpr std::size_t kDoublesAtOnce = SimplexTables::kControlPointLanes;
+using FourDoubles = double __attribute__((vector_size(kDoublesAtOnce * sizeof(double))));
 
 FourDoubles load_lanes(const double* from) {
   FourDoubles result;
@@ -25,7 +25,7 @@ FourDoubles load_lanes(const double* from) {
 void store_lanes(const FourDoubles& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
 /// Turns rows into columns.
-void transpose(FourDoubles (&x)[kFour]) {
+void transpose(FourDoubles (&x)[kDoublesAtOnce]) {
   const FourDoubles a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
   const FourDoubles b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
   const FourDoubles c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
@@ -43,7 +43,7 @@ double small_error(int order) { return order <= 4 ? 0.08 : 0.004; }
 /// `HexBoxes`).
 constexpr double kHopelessSimplexError = 1;
 /// New models need not reduce the error by more than this factor: the next ones will.
-constexpr double kFall = 0.05;
+constexpr double kEnoughErrorFall = 0.05;
 
 }  // namespace
 
@@ -53,7 +53,7 @@ SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
       simplex_(SimplexModels::get(kind, basis, order)),
       line_(LineModels::get(basis, order, kWide - 1)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1),
-      lanes_(rounded_up(3 * num_layers_, kFour)),
+      lanes_(rounded_up(3 * num_layers_, kDoublesAtOnce)),
       small_error_(small_error(order)),
       whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
@@ -215,16 +215,16 @@ void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t firs
       for (int n = 0; n < kWide; ++n)
         for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[i][row][n];
     } else {
-      FourDoubles low[kFour] = {}, high[kFour] = {};
+      FourDoubles low[kDoublesAtOnce] = {}, high[kDoublesAtOnce] = {};
       for (int row = 0; row < 3; ++row) {
         low[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 0, 1, 2, 3);
         high[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 4, 5, 6, 7);
       }
       transpose(low);
       transpose(high);
-      for (std::size_t n = 0; n < kFour; ++n) {
-        store_lanes(low[n], out + n * kFour);
-        store_lanes(high[n], out + (kFour + n) * kFour);
+      for (std::size_t n = 0; n < kDoublesAtOnce; ++n) {
+        store_lanes(low[n], out + n * kDoublesAtOnce);
+        store_lanes(high[n], out + (kDoublesAtOnce + n) * kDoublesAtOnce);
       }
     }
   }
@@ -235,7 +235,7 @@ bool SimplexBoxes::improve(Box& box, double lowest, bool) {
       !models_matter(box, lowest))
     return false;
   const double error = by_mean_edges(lasting_error(box));
-  take_models(box, std::max(wanted_error(lowest / mean_edges_.prod()), kFall * error), box.tier + 1);
+  take_models(box, std::max(wanted_error(lowest / mean_edges_.prod()), kEnoughErrorFall * error), box.tier + 1);
   return true;
 }
 
@@ -276,7 +276,7 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
   const bool modeled =
       numbered && box.halvings % simplex_.halvings_between() == 0 && (box.tier < 0 || models_matter(box, lowest));
   const double wanted = std::max(wanted_error(lowest / mean_edges_.prod()),
-                                 modeled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
+                                 modeled && box.tier >= 0 ? kEnoughErrorFall * by_mean_edges(lasting_error(box)) : 0);
   AlignedDoubles control = std::move(box.control);
   box.control.clear();
   std::array<Box, 2> result{box, std::move(box)};
@@ -298,12 +298,12 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
 void SimplexBoxes::halve_control(const SimplexHalving& halving, AlignedDoubles& low, AlignedDoubles& high) const {
   for (const SimplexHalving::Round& round : halving.rounds) {
     for (const auto& [n, other] : round.means)
-      for (std::size_t lane = 0; lane < lanes_; lane += kFour) {
+      for (std::size_t lane = 0; lane < lanes_; lane += kDoublesAtOnce) {
         double* x = low.data() + n * lanes_ + lane;
         store_lanes(0.5 * (load_lanes(x) + load_lanes(low.data() + other * lanes_ + lane)), x);
       }
     for (const auto& [from, to] : round.copies)
-      for (std::size_t lane = 0; lane < lanes_; lane += kFour)
+      for (std::size_t lane = 0; lane < lanes_; lane += kDoublesAtOnce)
         store_lanes(load_lanes(low.data() + from * lanes_ + lane), high.data() + to * lanes_ + lane);
   }
 }
@@ -329,12 +329,12 @@ ControlMatrices& TetBoxes::matrices(const Box& box) {
   matrices_.resize(t.lower.size());
   const double* x = box.control.data();
   const FourDoubles degree = FourDoubles{} + t.index.degree();
-  for (std::size_t first = 0; first < t.raised[0].size(); first += kFour) {
-    FourDoubles columns[3][kFour];
-    for (std::size_t n = 0; n < kFour; ++n) {
-      const FourDoubles origin = load_lanes(x + t.raised[0][first + n] * kFour);
+  for (std::size_t first = 0; first < t.raised[0].size(); first += kDoublesAtOnce) {
+    FourDoubles columns[3][kDoublesAtOnce];
+    for (std::size_t n = 0; n < kDoublesAtOnce; ++n) {
+      const FourDoubles origin = load_lanes(x + t.raised[0][first + n] * kDoublesAtOnce);
       for (int d = 0; d < 3; ++d)
-        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kFour) - origin);
+        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kDoublesAtOnce) - origin);
     }
     for (int d = 0; d < 3; ++d) {
       transpose(columns[d]);

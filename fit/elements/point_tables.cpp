@@ -22,10 +22,12 @@ constexpr int kWideAtOnce = 4, kModesAtOnce = 4;
 /// Returns the sides that a point lies on, as bits. Side s is: l_s = 0 for a tet; l_0 .. l_2 = 0, w = 0, w = 1 for a
 /// prism; u = 0, u = 1, v = 0, .. for a hex.
 unsigned sides_at(CellKind kind, const Vec3& p) {
-  constexpr double kOn = 1e-15;  // canonical coordinates; rounding of a quadrature point on a side
+  constexpr double kOnSideTolerance = 1e-15;  // canonical coordinates; rounding of a quadrature point on a side
   unsigned sides = 0;
   int side = 0;
-  const auto add = [&](double distance) { sides |= static_cast<unsigned>(std::abs(distance) <= kOn) << side++; };
+  const auto add = [&](double distance) {
+    sides |= static_cast<unsigned>(std::abs(distance) <= kOnSideTolerance) << side++;
+  };
   if (kind != CellKind::hex) {
     add(kind == CellKind::tet ? 1 - p[0] - p[1] - p[2] : 1 - p[0] - p[1]);
     for (int d = 0; d < (kind == CellKind::tet ? 3 : 2); ++d) add(p[d]);

@@ -30,7 +30,7 @@ constexpr std::size_t kMostPointsPerTriangle = 6;
 constexpr double kLeastOffset = 1e-6;
 
 /// Least product of normals that agree, and the weight of points where they do not (`discount_disagreeing`).
-constexpr double kAgreement = 0.2, kDiscount = 0.02;
+constexpr double kLeastAgreeingProduct = 0.2, kDisagreeingWeight = 0.02;
 
 /// The points of a triangle that correspond to the target, by their number: the centroid; three inside; these and the
 /// corners, which serve as points of the edges, where the surfaces are farthest apart.
@@ -239,7 +239,7 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples, bool finds)
               target_->normals()[hit.triangle],
               factor(static_cast<Index>(t)) * emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n),
               tau_};
-      if (discounts_ && own_normal.dot(link.normal) < kAgreement) link.weight *= kDiscount;
+      if (discounts_ && own_normal.dot(link.normal) < kLeastAgreeingProduct) link.weight *= kDisagreeingWeight;
       surface_distances_[begin + k] = hit.distance;
       if (!over_rim(hit)) {
         if (straight && hit.distance > kLeastOffset * target_->length()) link.normal = (x - hit.point) / hit.distance;

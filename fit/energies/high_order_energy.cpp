@@ -428,10 +428,10 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
 
 /// Makes a point of one lane ten times as stiff: both its frozen numbers and their part of `mean_blocks`.
 void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane) {
-  constexpr double kStiffer = 10;  // the factor; docs/fitting.md, "Steps"
+  constexpr double kStiffeningFactor = 10;  // the factor; docs/fitting.md, "Steps"
   const int size = frozen_size(kernels_->coupled);
   Wide more[kMostFrozen];
-  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffer, more);
+  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffeningFactor, more);
   Wide* blocks = &group.mean_blocks[54 * batch];
   kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
 }

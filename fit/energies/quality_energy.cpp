@@ -32,7 +32,7 @@ constexpr double kLeastGoalShare = -1;  // no inverted cell is worse than anothe
 constexpr double kFoldGoal = 0.5;       // residual of a fold that is good enough: 330 degrees if the limit is 300
 /// Factors on the emphasis of a cell that is below its goal, or above it, and the largest emphasis. It rises within a
 /// few rounds and falls slowly, so that a cell which has just reached its goal stays there.
-constexpr double kCellEmphasisRaise = 2.5, kCellEmphasisFall = 0.97, kMostCellEmphasis = 1000;
+constexpr double kCellEmphasisRise = 2.5, kCellEmphasisFall = 0.97, kMostCellEmphasis = 1000;
 
 constexpr double kSamePlace = 1e-12;  // in canonical coordinates
 
@@ -442,7 +442,7 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
 QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, double goal) {
   std::vector<double> least(mesh_->num_cells()), shares(mesh_->num_cells());
   const auto update = [](double share, double& emphasis) {
-    emphasis = share < 1 ? std::min(kMostCellEmphasis, kCellEmphasisRaise * emphasis)
+    emphasis = share < 1 ? std::min(kMostCellEmphasis, kCellEmphasisRise * emphasis)
                          : std::max(1.0, kCellEmphasisFall * emphasis);
   };
 #pragma omp parallel for schedule(static)
@@ -503,12 +503,12 @@ std::vector<Index> QualityEnergy::uncertified(std::span<const Vec3> nodes) const
 std::vector<Index> QualityEnergy::ruined(std::span<const Vec3> before, std::span<const Vec3> after) const {
   // Scaled Jacobian from which on no loss matters. Below it, a cell must keep half of what it had, and an inverted cell
   // may lose this much.
-  constexpr double kAcceptable = 0.05, kKeptShare = 0.5, kMostLoss = 0.02;
+  constexpr double kAcceptableScaledJacobian = 0.05, kKeptShare = 0.5, kMostLoss = 0.02;
   std::vector<std::uint8_t> is_ruined(mesh_->num_cells());
 #pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < is_ruined.size(); ++c) {
     const double now = least_scaled_jacobian(c, points_of(c), after);
-    if (now >= kAcceptable) continue;
+    if (now >= kAcceptableScaledJacobian) continue;
     const double was = least_scaled_jacobian(c, points_of(c), before);
     is_ruined[c] = was > 0 ? now < kKeptShare * was : now < was - kMostLoss;
   }

@@ -156,8 +156,8 @@ class PartDiagonals {
 }  // namespace
 
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves) {
-  constexpr double kLongCurveShare = 0.03;  // of the diagonal
-  constexpr double kCrispCurveShare = 0.5;  // of a curve's length
+  constexpr double kLongCurveShare = 0.03;       // of the diagonal
+  constexpr double kLeastCrispCurveShare = 0.5;  // of a curve's length
   EdgeCrispness result;
   if (curves.empty()) return result;
   const Bends bends(mesh, curves);
@@ -173,7 +173,7 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
     const double length = curve.length();
     all += length;
     crisp += crisp_here;
-    if (length > kLongCurveShare * diagonals.at(curve.vertices[0]) && crisp_here > kCrispCurveShare * length)
+    if (length > kLongCurveShare * diagonals.at(curve.vertices[0]) && crisp_here > kLeastCrispCurveShare * length)
       long_crisp += length;
   }
   if (all > 0) {
@@ -188,13 +188,13 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
 }
 
 EdgeDecision decide_about_edges(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges) {
-  constexpr double kNotable = 0.3;  // relative length that is worth a warning
+  constexpr double kNotableEdgeLength = 0.3;  // relative length that is worth a warning
   if (!angle_degrees) return {};
   const FeatureCurves curves = feature_curves(mesh, *angle_degrees);
   if (follows_all_edges || curves.empty()) return {!curves.empty(), {}};
   const EdgeCrispness crispness = edge_crispness(mesh, curves);
   if (crispness.is_designed()) return {true, {}};
-  if (std::max(crispness.relative_length, crispness.relative_planar_length) < kNotable) return {};
+  if (std::max(crispness.relative_length, crispness.relative_planar_length) < kNotableEdgeLength) return {};
   double length = 0;
   Eigen::AlignedBox3d box;
   for (const auto& triangle : mesh.triangles)

@@ -98,7 +98,7 @@ CurveSearch::Course CurveSearch::course_by_middle(Index c) const {
 
 /// Around a closed curve in three legs, from its corner or its point nearest to a vertex.
 CurveSearch::Course CurveSearch::round_course(Index c) const {
-  constexpr int kLegs = 3;  // the fewest that go around: two could be the same path, there and back
+  constexpr int kRoundCourseLegs = 3;  // the fewest that go around: two could be the same path, there and back
   const FeatureCurve& curve = curves_[c];
   const Index corner = curve.vertices.front(),
               fixed = features_.curves.is_corner(corner) ? corners_.vertex_of(corner) : kNoIndex;
@@ -107,8 +107,8 @@ CurveSearch::Course CurveSearch::round_course(Index c) const {
   const ArcLength arc(twice);
   const double length = arc.length() / 2, start = fixed == kNoIndex ? place_nearest_to_vertex(c) : 0;
   Course course;
-  for (int k = 0; k < kLegs; ++k) {
-    const double from = start + length * k / kLegs, to = start + length * (k + 1) / kLegs;
+  for (int k = 0; k < kRoundCourseLegs; ++k) {
+    const double from = start + length * k / kRoundCourseLegs, to = start + length * (k + 1) / kRoundCourseLegs;
     course.anchors.push_back({arc.at(from), k == 0 ? fixed : kNoIndex});
     course.legs.push_back(walk_along(c, arc.part(from, std::min(to, arc.length()))));
   }

@@ -23,7 +23,7 @@ namespace {
 
 /// Largest number of rounds, each of which starts with the curves that failed in the one before. Found on twelve CAD
 /// parts.
-constexpr int kRoutingRounds = 8;
+constexpr int kMostRoutingRounds = 8;
 
 /// One attempt at paths of all curves, with vertices of its own for the corners.
 class RoutingAttempt {
@@ -46,7 +46,7 @@ class RoutingAttempt {
   /// Finds paths of whole curves.
   void run() {
     std::vector<Index> order = order_by_gap();
-    for (int round = 0; round < kRoutingRounds && !order.empty(); ++round) {
+    for (int round = 0; round < kMostRoutingRounds && !order.empty(); ++round) {
       const std::vector<std::uint8_t> failed = run_round(order);
       const auto has_failed = [&](Index c) { return failed[c] != 0; };
       if (std::ranges::none_of(order, has_failed)) break;

@@ -17,7 +17,7 @@ namespace subvol::internal {
 namespace {
 
 /// Share of the best possible scaled Jacobian that is asked for.
-constexpr double kReachable = 0.93;
+constexpr double kReachableShare = 0.93;
 /// Bound at corners of several cells; with 0.55 a pyramid got 0.53, with this 0.66.
 constexpr double kCornerCap = 0.8;
 /// Distance, as a share of a curve's length, at which its direction at a corner is measured.
@@ -32,7 +32,7 @@ void require_curves(const PatchedMesh& patched, const SignedFeatures& features) 
 
 double edge_cap(double angle, int cells) {
   const double part = std::min(180.0, angle / cells);
-  return kReachable * std::max(0.0, std::sin(part * std::numbers::pi / 180));
+  return kReachableShare * std::max(0.0, std::sin(part * std::numbers::pi / 180));
 }
 
 std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features) {
@@ -70,7 +70,7 @@ std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatu
     if (is_repeated || at == directions.end() || at->second.size() < 3) continue;
     const auto& t = at->second;
     const double best = std::abs(t[0].dot(t[1].cross(t[2])));
-    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachable * best : kCornerCap});
+    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachableShare * best : kCornerCap});
   }
   return caps;
 }

@@ -18,7 +18,8 @@ struct PathsOfCurves {
   std::vector<Index> possible;                   ///< curves that have a path if no other one has; ascending
 };
 
-/// Returns what `route_features` does: the paths, the corners at which they end, and why which curves are not followed.
+/// Returns the result of `route_features`: the paths, the corners at which they end, and for each curve that is not
+/// followed the reason.
 FeatureRouting routing_result(const RoutingTask& task, const CornerPlacement& corners, const PathsOfCurves& paths);
 
 }  // namespace subvol::internal

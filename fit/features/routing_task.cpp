@@ -15,7 +15,7 @@ namespace {
 
 /// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
 /// Jacobian at which cells are given up.
-constexpr double kLeastAngle = 19;
+constexpr double kLeastFollowedAngle = 19;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ RoutingTask::RoutingTask(const VolumeMesh& mesh, const SignedFeatures& features,
     const FeatureCurve& curve = curves()[c];
     if (!options.excluded.empty() && options.excluded[c])
       reasons_[c] = NotFollowed::excluded;
-    else if (features.angles[c] < kLeastAngle)
+    else if (features.angles[c] < kLeastFollowedAngle)
       reasons_[c] = NotFollowed::too_acute;
     else if (curve.length() < kLeastRoutedLength * graph_.edge_length() && !has_edge_on(graph_, curve))
       reasons_[c] = NotFollowed::shorter_than_cell;

@@ -37,7 +37,8 @@ class RoutingTask {
   std::vector<Index> eligible_by_length() const;
   /// Returns true if the path of a curve may end inside that of another one.
   bool may_join(Index c) const { return may_join_[c] != 0; }
-  /// Returns what `CurveSearch` expects: one entry per curve; nothing if paths run along the boundary.
+  /// Returns what `CurveSearch` expects: one entry per curve; nothing if paths run along the boundary. The span points
+  /// into this object.
   std::optional<std::span<const std::uint8_t>> along_sheet_curves() const;
 
  private:

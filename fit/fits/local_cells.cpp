@@ -95,7 +95,7 @@ std::vector<Index> cells_between_sizes(std::span<const double> sizes) {
 }
 
 void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps) {
-  constexpr double kCap = 0.57;  // the goal at a cap is lower by 0.02
+  constexpr double kSizeChangeCap = 0.57;  // the goal at a cap is lower by 0.02
   std::vector<std::uint8_t> is_between(mesh.num_vertices(), 0);
   for (const Index c : cells_between_sizes(sizes)) {
     const auto cell = mesh.cell(c);
@@ -103,11 +103,11 @@ void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> size
     const CellTopology& topology = cell_topology(mesh.kinds[c]);
     for (int e = 0; e < topology.num_edges; ++e) {
       const auto [low, high] = std::minmax(cell[topology.edges[e][0]], cell[topology.edges[e][1]]);
-      caps.edges.push_back({{low, high}, kCap});
+      caps.edges.push_back({{low, high}, kSizeChangeCap});
     }
   }
   for (std::size_t v = 0; v < is_between.size(); ++v)
-    if (is_between[v]) caps.vertices.push_back({static_cast<Index>(v), kCap});
+    if (is_between[v]) caps.vertices.push_back({static_cast<Index>(v), kSizeChangeCap});
 }
 
 std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const double> sizes, std::size_t num_cells,

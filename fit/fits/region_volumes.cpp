@@ -82,9 +82,9 @@ FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
 /// Takes a direction out of those in which a vertex may move.
 void forbid(Mat3& projector, const Vec3& normal) {
   // Sine of 3 degrees: normals closer than that to those forbidden before are not independent of them.
-  constexpr double kIndependentNormalSine = 0.05;
+  constexpr double kLeastIndependentNormalSine = 0.05;
   const Vec3 left = projector * normal;
-  if (left.norm() < kIndependentNormalSine) return;
+  if (left.norm() < kLeastIndependentNormalSine) return;
   projector -= left * left.transpose() / left.squaredNorm();
 }
 
@@ -200,15 +200,16 @@ bool restore_by_moves(VolumeMesh mesh, std::span<const double> wanted, double le
 }  // namespace
 
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kMeshVolumeRounds = 6;  // of Newton's method
+  constexpr int kMostMeshVolumeRounds = 6;  // of Newton's method
   return restore_by_moves(
-      mesh, wanted, least_jacobian, kMeshVolumeRounds, [](const std::vector<Vec3>& x) { return x; }, mesh.positions);
+      mesh, wanted, least_jacobian, kMostMeshVolumeRounds, [](const std::vector<Vec3>& x) { return x; },
+      mesh.positions);
 }
 
 bool restore_volumes(FittedCage& cage, std::span<const double> wanted, double least_jacobian) {
-  constexpr int kCageVolumeRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
+  constexpr int kMostCageVolumeRounds = 12;  // they converge linearly, because the mesh does not move by d exactly
   return restore_by_moves(
-      cage.mesh(), wanted, least_jacobian, kCageVolumeRounds,
+      cage.mesh(), wanted, least_jacobian, kMostCageVolumeRounds,
       [&](const std::vector<Vec3>& x) { return cage.level().nodes.apply(x); }, cage.cage.positions);
 }
 

@@ -102,15 +102,16 @@ std::vector<Samples::Edge> edges_of(const TriangleMesh& mesh, std::span<const In
 }
 
 Samples samples_of(const TriangleMesh& mesh, std::span<const Index> order, const SurfaceDistanceOptions& options) {
-  // If there are more than kDense triangles per sample, a triangle of less than kLeastSampledShare of a sample's area
-  // is sampled at its corners only. A fitted surface is farthest at its corners: a coarse one must not be sampled so.
-  constexpr std::size_t kDense = 4;
+  // If there are more than kDenseTrianglesPerSample triangles per sample, a triangle of less than kLeastSampledShare of
+  // a sample's area is sampled at its corners only. A fitted surface is farthest at its corners: a coarse one must not
+  // be sampled so.
+  constexpr std::size_t kDenseTrianglesPerSample = 4;
   constexpr double kLeastSampledShare = 0.125;
   Samples samples;
   std::vector<double> areas(order.size());
   for (std::size_t place = 0; place < order.size(); ++place)
     samples.area += areas[place] = triangle_area(mesh, mesh.triangles[order[place]]);
-  const bool is_dense = order.size() > kDense * static_cast<std::size_t>(options.num_samples);
+  const bool is_dense = order.size() > kDenseTrianglesPerSample * static_cast<std::size_t>(options.num_samples);
   std::vector<double> of_vertex(mesh.positions.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
     const double share = samples.area > 0 ? options.num_samples * (areas[place] / samples.area) : 0;

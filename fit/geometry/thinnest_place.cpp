@@ -18,8 +18,8 @@ constexpr std::size_t kThinnessSamples = 20'000;  // points of the surface from 
 constexpr int kMostEdgeParts = 6;                 // into which an edge of a triangle is cut
 /// A ball counts as empty if a smaller one is, by this factor. The center of the smaller one is not as far from many
 /// triangles as from the closest, as the center of a round solid is: the search stays short.
-constexpr double kSmaller = 0.75;
-constexpr double kNarrower = 0.99;            // share of the best width below which a place is looked at closely
+constexpr double kEmptyBallFactor = 0.75;
+constexpr double kCloseLookShare = 0.99;      // share of the best width below which a place is looked at closely
 constexpr double kMostCosine = -0.5;          // of the angle between the normals of two stretches that face each other
 constexpr double kLeastAcrossCosine = 0.866;  // of the angle between the normal and the line across: 30 degrees
 
@@ -67,21 +67,22 @@ class Balls {
     if (!front.allFinite() || front.isZero()) return {};
     const Vec3 inward = side_ == ThinSide::wall ? Vec3(-front) : front;
     // The line across is within 30 degrees of the normal: the ball is no larger than the width over the root of 3.
-    const double radius = std::min(diagonal_, most / std::sqrt(3.0) / kSmaller);
+    const double radius = std::min(diagonal_, most / std::sqrt(3.0) / kEmptyBallFactor);
     ThinPlace found;
     if (!shrink(sample, inward, radius, found) || !faces(found, inward)) return {};
     return found;
   }
 
  private:
-  /// Shrinks a ball until the surface is outside of `kSmaller` times it. Returns false if it never touches the surface.
+  /// Shrinks a ball until the surface is outside of `kEmptyBallFactor` times it. Returns false if it never touches the
+  /// surface.
   bool shrink(const Sample& sample, const Vec3& inward, double radius, ThinPlace& found) const {
-    constexpr int kMostShrinkingSteps = 40;  // of kSmaller each: 1e-5 of the first radius
-    constexpr double kTouches = 1e-7;        // share of the radius
+    constexpr int kMostShrinkingSteps = 40;   // of kEmptyBallFactor each: 1e-5 of the first radius
+    constexpr double kTouchTolerance = 1e-7;  // share of the radius
     for (int step = 0; step < kMostShrinkingSteps; ++step) {
-      const double smaller = kSmaller * radius;
+      const double smaller = kEmptyBallFactor * radius;
       const ClosestPoint::Hit hit = tree_.closest(sample.point + smaller * inward, sample.triangle);
-      if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouches) * smaller) break;
+      if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouchTolerance) * smaller) break;
       const Vec3 to = hit.point - sample.point;
       const double depth = inward.dot(to);
       if (!(depth > 0)) return false;
@@ -116,7 +117,7 @@ std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestP
   for (std::size_t first = 0; first < samples.size(); first += kAtATime) {
     if (cancelled && cancelled()) return std::nullopt;
     const std::size_t end = std::min(first + kAtATime, samples.size());
-    const double most = best ? kNarrower * best->width : std::numeric_limits<double>::infinity();
+    const double most = best ? kCloseLookShare * best->width : std::numeric_limits<double>::infinity();
 #pragma omp parallel for schedule(dynamic, 64)
     for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i], most);
     for (std::size_t i = first; i < end; ++i)

@@ -269,10 +269,10 @@ void LocalMender::try_all(ChangeSearch& search, const PatchFaults& known, const 
 }
 
 void LocalMender::try_pairs(ChangeSearch& search, const PatchFaults& known) {
-  constexpr std::size_t kBest = 6;  // first changes for which a second one is tried
+  constexpr std::size_t kMostFirstChanges = 6;  // for which a second one is tried
   std::vector<Trial>& trials = search.trials;
   std::stable_sort(trials.begin(), trials.end());
-  const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kBest, trials.size()));
+  const std::vector<Trial> first(trials.begin(), trials.begin() + std::min(kMostFirstChanges, trials.size()));
   for (const Trial& trial : first) {
     PatchUndo replaced;
     search.patch.apply(trial.changes[0], replaced);

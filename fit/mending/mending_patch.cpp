@@ -50,14 +50,16 @@ double segment_distance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
   return (w + s * u - t * v).norm();
 }
 
-constexpr double kHidden = -1;   // clearance of a vertex without a direction
-constexpr double kEdgeOn = 0.1;  // cosine between a direction and a normal: 6 degrees
+constexpr double kHiddenClearance = -1;  // clearance of a vertex without a direction
+constexpr double kEdgeOn = 0.1;          // cosine between a direction and a normal: 6 degrees
 
-/// Returns the least cosine between normals and the direction that sees all of them best; `kHidden` if there is none.
+/// Returns the least cosine between normals and the direction that sees all of them best; `kHiddenClearance` if there
+/// is none.
 double clearance(const std::vector<Vec3>& normals) {
-  if (std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return !(n.norm() > 0.5); })) return kHidden;
+  if (std::any_of(normals.begin(), normals.end(), [](const Vec3& n) { return !(n.norm() > 0.5); }))
+    return kHiddenClearance;
   const std::optional<Vec3> direction = most_visible_direction(normals);
-  if (!direction) return kHidden;
+  if (!direction) return kHiddenClearance;
   double least = 1;
   for (const Vec3& n : normals) least = std::min(least, direction->dot(n));
   return least;
@@ -98,7 +100,7 @@ void set_position(MendingPatch& patch, Index v, const Vec3& position) {
 
 void count_clearances(PatchFaults& faults) {
   const std::vector<double>& all = faults.clearances;
-  faults.num_hidden = static_cast<std::size_t>(std::count(all.begin(), all.end(), kHidden));
+  faults.num_hidden = static_cast<std::size_t>(std::count(all.begin(), all.end(), kHiddenClearance));
   faults.num_hard =
       static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](double c) { return c < kEdgeOn; }));
 }
@@ -313,7 +315,7 @@ PatchRating FaultsAfter::rating(double distance, MendingGoal goal) const {
   for (const auto& [t, s] : known_.meeting) num_faults += !is_changed(t) && !is_changed(s);
   for (const Index t : known_.flat) num_faults += !is_changed(t);
   for (const auto& [v, clearance] : clearances_) {
-    num_hidden = num_hidden + (clearance == kHidden) - (known_.clearances[v] == kHidden);
+    num_hidden = num_hidden + (clearance == kHiddenClearance) - (known_.clearances[v] == kHiddenClearance);
     num_hard = num_hard + (clearance < kEdgeOn) - (known_.clearances[v] < kEdgeOn);
   }
   return {.faults = num_faults + (goal == MendingGoal::layers ? num_hidden : 0),

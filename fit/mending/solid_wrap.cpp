@@ -26,11 +26,11 @@ bool bounds_solid(const TriangleMesh& surface) {
 }
 
 bool has_sheets(const SurfaceDiagnosis& diagnosis) {
-  constexpr std::size_t kChaos = 10;  // crossings for each edge of a sheet
+  constexpr std::size_t kChaoticCrossingsPerEdge = 10;  // crossings for each edge of a sheet
   const SurfaceFinding* edges = diagnosis.find(SurfaceFault::interface);
   if (!edges) return false;
   const SurfaceFinding* crossings = diagnosis.find(SurfaceFault::crossing);
-  if (crossings && crossings->count > kChaos * edges->count) return false;
+  if (crossings && crossings->count > kChaoticCrossingsPerEdge * edges->count) return false;
   double length = 0;
   for (const SurfacePlace& place : edges->places)
     if (place.to) length += (*place.to - place.at).norm();

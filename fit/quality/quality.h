@@ -13,8 +13,6 @@
 namespace subvol {
 
 inline constexpr int kNumHistogramBins = 20;  ///< of scaled Jacobians from -1 to 1, each 0.1 wide
-/// Least rise of the least or the mean scaled Jacobian that is a gain; less is rounding.
-inline constexpr double kLeastJacobianGain = 1e-6;
 
 /// Quality of the cells of a mesh, and what is proved about them.
 struct QualityReport {

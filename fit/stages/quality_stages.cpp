@@ -40,8 +40,8 @@ double above(double goal, double margin = kHingeMargin) { return std::min(0.95, 
 }  // namespace
 
 double LiftMerit::cost_of_cell(double share) const {
-  constexpr double kPoor = 0.8;  // share of the goal below which a cell costs more
-  return 1 - share + poor * std::max(0.0, kPoor - share);
+  constexpr double kPoorShareOfGoal = 0.8;  // share of the goal below which a cell costs more
+  return 1 - share + poor * std::max(0.0, kPoorShareOfGoal - share);
 }
 
 double QualitySchedule::expected_steps() const {
@@ -81,10 +81,10 @@ QualitySchedule fine_quality_schedule(double goal) {
 QualitySchedule late_quality_schedule(double goal) {
   // Of joint129 at level 2, the worst cell rises from 0.08 to 0.60 with these weights while no distance rises by more
   // than 5 %; with those of the fine schedule, the mean distance of the limit surface rises by a third.
-  constexpr double kSlightMargin = 0.03, kSlight = 0.02;
+  constexpr double kSlightMargin = 0.03, kSlightWeightFactor = 0.02;
   QualityWeights weights{.hinge = 200, .threshold = above(goal, kSlightMargin)};
-  weights.cosine *= kSlight;
-  weights.twist *= kSlight;
+  weights.cosine *= kSlightWeightFactor;
+  weights.twist *= kSlightWeightFactor;
   QualitySchedule schedule{{}, {100, weights, kMostFineLiftSteps}, goal};
   schedule.far_margin = kLateFarMargin;
   return schedule;
@@ -224,7 +224,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
 /// triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
 double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
   // Factors on the emphasis of a triangle that is too far, or near enough, and the largest emphasis.
-  constexpr double kFarEmphasisRaise = 3, kFarEmphasisFall = 0.97, kMostFarEmphasis = 1000;
+  constexpr double kFarEmphasisRise = 3, kFarEmphasisFall = 0.97, kMostFarEmphasis = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
   if (!patch_mesh_) surface_->forget();  // the fit may be resumed from here, but not within a patch
@@ -235,7 +235,7 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
   double costs = 0;
   for (std::size_t t = 0; t < shares.size(); ++t) {
     double& emphasis = far_emphasis_[t];
-    emphasis = shares[t] > schedule.far_margin ? std::min(kMostFarEmphasis, kFarEmphasisRaise * emphasis)
+    emphasis = shares[t] > schedule.far_margin ? std::min(kMostFarEmphasis, kFarEmphasisRise * emphasis)
                                                : std::max(1.0, kFarEmphasisFall * emphasis);
     factors[t] *= emphasis;
     costs += std::pow(schedule.merit.cost_of_place(shares[t] - 1), kCostExponent);

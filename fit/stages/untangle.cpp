@@ -17,7 +17,7 @@ namespace {
 /// kLeastFall times the last one.
 constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
 /// Relative decrease of the energy below which a round counts as converged for its epsilon.
-constexpr double kStuck = 0.1;
+constexpr double kConvergedDecrease = 0.1;
 /// Factor on the weight of cells that are not certified after such a round.
 constexpr double kWeightGrowth = 1.5;
 /// A round ends after so many steps, or when two steps in a row decrease the energy by a smaller share than this:
@@ -104,7 +104,7 @@ UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const Untang
     fewest = std::min(fewest, cells.uncertified().size());
     best = std::max(best, cells.determinant());
     double next = kShareOfWorst * std::abs(cells.determinant());
-    if (decrease < kStuck) {
+    if (decrease < kConvergedDecrease) {
       next = std::min(next, kLeastFall * epsilon);
       cells.raise_weights();
     }

@@ -36,9 +36,9 @@ class WorkShare {
   /// Returns the share at the end of the present part.
   double share_at_end() const { return end_; }
   double share() const {
-    constexpr double kTrusted = 0.8;  // from here on, the part's end is approached and never reached
-    const double done = done_ / forecast_, rest = 1 - kTrusted;
-    const double eased = done < kTrusted ? done : 1 - rest * std::exp(-(done - kTrusted) / rest);
+    constexpr double kTrustedShare = 0.8;  // from here on, the part's end is approached and never reached
+    const double done = done_ / forecast_, rest = 1 - kTrustedShare;
+    const double eased = done < kTrustedShare ? done : 1 - rest * std::exp(-(done - kTrustedShare) / rest);
     return begin_ + eased * (end_ - begin_);
   }
 

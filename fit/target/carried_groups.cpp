@@ -27,7 +27,7 @@ namespace {
 
 /// Cosine of the largest angle between normals that agree: 60 degrees. Faces of a coarse mesh deviate from the surface
 /// by some 30; sides of a sharp edge that matter here are further apart.
-constexpr double kAgrees = 0.5;
+constexpr double kLeastAgreeingCosine = 0.5;
 
 std::vector<Vec3> normals_of(const TriangleMesh& mesh) {
   std::vector<Vec3> normals;
@@ -114,7 +114,7 @@ class TriangleFinder {
  private:
   bool agrees(Index triangle, const Vec3& normal) const {
     const double cosine = normals_[triangle].dot(normal);
-    return (is_oriented_ ? cosine : std::abs(cosine)) >= kAgrees;
+    return (is_oriented_ ? cosine : std::abs(cosine)) >= kLeastAgreeingCosine;
   }
 
   /// Turns the normals of a target that is oriented inward.

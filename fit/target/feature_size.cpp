@@ -14,13 +14,13 @@ namespace {
 
 /// Returns the radius of the ball at p on the side of n; `most` if it touches nothing that is about opposite to p.
 double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, double most) {
-  constexpr double kOpposite = -0.866;     // cosine of 150 degrees
-  constexpr double kTouching = 0.98;       // a ball is empty if the surface is farther than this share of its radius
-  constexpr int kMostBallShrinkings = 30;  // the radius falls in each, and rounding must not keep it falling
+  constexpr double kMostOppositeCosine = -0.866;  // cosine of 150 degrees
+  constexpr double kEmptyRadiusShare = 0.98;  // a ball is empty if the surface is farther than this share of its radius
+  constexpr int kMostBallShrinkings = 30;     // the radius falls in each, and rounding must not keep it falling
   double radius = most, cosine = 1;
   for (int round = 0; round < kMostBallShrinkings; ++round) {
     const Vec3 center = p + radius * n;
-    const ClosestPoint::Hit hit = tree.closest_within(center, kTouching * radius);
+    const ClosestPoint::Hit hit = tree.closest_within(center, kEmptyRadiusShare * radius);
     if (hit.triangle == kNoIndex) break;
     const Vec3 across = hit.point - p;
     const double height = across.dot(n), squared = across.squaredNorm();
@@ -28,7 +28,7 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
     radius = squared / (2 * height);
     cosine = -n.dot(hit.point - (p + radius * n)) / radius;
   }
-  return cosine < kOpposite ? radius : most;
+  return cosine < kMostOppositeCosine ? radius : most;
 }
 
 }  // namespace

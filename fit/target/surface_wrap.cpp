@@ -94,9 +94,10 @@ void InsideVoxels::add_halves(const Place& block, int size, std::vector<Place>& 
 }
 
 bool InsideVoxels::find() {
-  constexpr int kFirstBlockSize = 8;              // voxels along the edges of the first blocks
-  constexpr double kClear = 0.25, kAway = 1.2;    // from 1/2; from the surface, in radii of a block
-  constexpr std::size_t kBlocksAtOnce = 100'000;  // a fraction of a second
+  constexpr int kFirstBlockSize = 8;                // voxels along the edges of the first blocks
+  constexpr double kClearWindingDifference = 0.25;  // from 1/2
+  constexpr double kClearRadii = 1.2;               // distance from the surface, in radii of a block
+  constexpr std::size_t kBlocksAtOnce = 100'000;    // a fraction of a second
   std::vector<Place> blocks;
   for (int k = 0; k < grid_.counts[2]; k += kFirstBlockSize)
     for (int j = 0; j < grid_.counts[1]; j += kFirstBlockSize)
@@ -116,8 +117,8 @@ bool InsideVoxels::find() {
       if (size > 1) tree_.closest(centers, hits);
       for (std::size_t b = first; b < end; ++b) {
         const double number = winding[b - first];
-        const bool is_clear =
-            hits[b - first].distance >= kAway * radius && std::abs(number - kLeastInsideWindingNumber) >= kClear;
+        const bool is_clear = hits[b - first].distance >= kClearRadii * radius &&
+                              std::abs(number - kLeastInsideWindingNumber) >= kClearWindingDifference;
         if (size == 1 || is_clear)
           label(blocks[b], size, number >= kLeastInsideWindingNumber);
         else

@@ -64,7 +64,7 @@ class Remarks {
 /// sorted  the corners in ascending order
 std::vector<std::array<Index, 3>> cut_at_holes(const std::vector<Vec3>& positions, const std::vector<Index>& corners,
                                                std::vector<Index> sorted) {
-  constexpr double kOverlap = 1e-3;  // share of the area that a polygon may lose by not being flat
+  constexpr double kMostLostAreaShare = 1e-3;  // share of the area that a polygon may lose by not being flat
   if (corners.size() < 5 || corners.size() > kMaxPolygonCorners) return {};
   std::vector<std::pair<Index, Index>> edges;
   for (std::size_t i = 0; i < corners.size(); ++i) edges.emplace_back(corners[i], corners[(i + 1) % corners.size()]);
@@ -86,7 +86,7 @@ std::vector<std::array<Index, 3>> cut_at_holes(const std::vector<Vec3>& position
     sum += of_one, area += of_one.norm();
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) triangles.push_back({sorted[t[0]], sorted[t[1]], sorted[t[2]]});
   }
-  if (!(area > 0 && area <= sum.norm() * (1 + kOverlap))) return {};
+  if (!(area > 0 && area <= sum.norm() * (1 + kMostLostAreaShare))) return {};
   return triangles;
 }
 
@@ -271,8 +271,8 @@ namespace {
 /// Refuses a surface of which a vertex is so far away that the rest is a point beside it: a digit was lost, or a
 /// coordinate was never set.
 void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& remarks) {
-  constexpr double kStray = 1e6;              // times the distance of most vertices
-  constexpr double kUsualVertexShare = 0.75;  // they lie within the usual distance
+  constexpr double kStrayDistanceFactor = 1e6;  // times the distance of most vertices
+  constexpr double kUsualVertexShare = 0.75;    // they lie within the usual distance
   const auto place = static_cast<std::ptrdiff_t>(kUsualVertexShare * static_cast<double>(positions.size() - 1));
   std::vector<double> values(positions.size());
   Vec3 middle;
@@ -287,7 +287,7 @@ void check_stray_vertices(const std::vector<Vec3>& positions, const Remarks& rem
   const double largest = values[farthest];
   std::nth_element(values.begin(), values.begin() + place, values.end());
   const double usual = values[static_cast<std::size_t>(place)];
-  if (!(usual > 0) || largest <= kStray * usual) return;
+  if (!(usual > 0) || largest <= kStrayDistanceFactor * usual) return;
   std::string place_text;
   for (int axis = 0; axis < 3; ++axis) {
     place_text += axis == 0 ? "" : ", ";

@@ -323,8 +323,9 @@ class PlyParser {
       skip_value(property.type);
     } else if (property.use == Use::label) {
       label_name_ = property.name;
-      constexpr const char* kWhat = "a label of a face";
-      labels_.push_back(text_ ? scan_.integer(kWhat) : static_cast<std::int64_t>(read_whole(property.type, kWhat)));
+      constexpr const char* kFaceLabelText = "a label of a face";
+      labels_.push_back(text_ ? scan_.integer(kFaceLabelText)
+                              : static_cast<std::int64_t>(read_whole(property.type, kFaceLabelText)));
     } else if (property.use >= Use::red) {
       const double level = read_number(property.type, "a color of a face");
       color_[static_cast<std::size_t>(property.use) - static_cast<std::size_t>(Use::red)] =

@@ -11,11 +11,11 @@ namespace subvol::internal {
 
 namespace {
 
-/// The vertices of a cell or a face in ascending order, with kNoIndex last.
-using VertexKey = std::array<Index, kMaxCellVertices>;
+/// The vertices of a cell in ascending order, with kNoIndex last.
+using CellKey = std::array<Index, kMaxCellVertices>;
 
-VertexKey sorted_key(std::span<const Index> vertices) {
-  VertexKey key;
+CellKey cell_key(std::span<const Index> vertices) {
+  CellKey key;
   key.fill(kNoIndex);
   std::size_t size = 0;
   for (const Index v : vertices) {
@@ -24,16 +24,6 @@ VertexKey sorted_key(std::span<const Index> vertices) {
     key[i] = v;
   }
   return key;
-}
-
-/// Calls visit(run) for every maximal run of at least `length` equal keys; the items of a run ascend.
-template <class Visit>
-void for_each_run(std::vector<std::pair<VertexKey, Index>>& items, std::size_t length, const Visit& visit) {
-  std::sort(items.begin(), items.end());
-  for (std::size_t first = 0, last; first < items.size(); first = last) {
-    for (last = first + 1; last < items.size() && items[last].first == items[first].first;) ++last;
-    if (last - first >= length) visit(std::span(items).subspan(first, last - first));
-  }
 }
 
 }  // namespace
@@ -80,10 +70,10 @@ void check_positions(const VolumeMesh& mesh, DefectList& defects) {
 
 bool check_cell_vertices(const VolumeMesh& mesh, DefectList& defects) {
   const std::size_t before = defects.size();
-  std::vector<std::pair<VertexKey, Index>> items(mesh.num_cells());
+  std::vector<std::pair<CellKey, Index>> items(mesh.num_cells());
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto cell = mesh.cell(c);
-    items[c] = {sorted_key(cell), static_cast<Index>(c)};
+    items[c] = {cell_key(cell), static_cast<Index>(c)};
     const auto& key = items[c].first;
     const auto twice = std::adjacent_find(key.begin(), key.begin() + cell.size());
     if (twice != key.begin() + cell.size())
@@ -91,34 +81,17 @@ bool check_cell_vertices(const VolumeMesh& mesh, DefectList& defects) {
                   cell_name(mesh, c) + " names " + vertex_name(*twice) + " more than once");
   }
   const bool good = defects.size() == before;
-  for_each_run(items, 2, [&](auto run) {
-    for (const auto& item : run.subspan(1))
-      defects.add(MeshDefect::Kind::duplicate_cell, item.second,
-                  cell_name(mesh, item.second) + " has the same vertices as cell " + std::to_string(run[0].second));
-  });
-  return good;
-}
-
-bool check_shared_faces(const VolumeMesh& mesh, DefectList& defects) {
-  const std::size_t before = defects.size();
-  std::vector<std::pair<VertexKey, Index>> items;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    const CellTopology& topology = cell_topology(mesh.kinds[c]);
-    for (int f = 0; f < topology.num_faces; ++f) {
-      std::array<Index, 4> corners;
-      for (int i = 0; i < topology.face_sizes[f]; ++i) corners[i] = mesh.cell(c)[topology.faces[f][i]];
-      items.push_back({sorted_key({corners.data(), std::size_t(topology.face_sizes[f])}), static_cast<Index>(c)});
+  std::sort(items.begin(), items.end());
+  for (std::size_t first = 0, i = 1; i < items.size(); ++i) {
+    if (items[i].first != items[first].first) {
+      first = i;
+      continue;
     }
+    const auto c = static_cast<std::size_t>(items[i].second);
+    defects.add(MeshDefect::Kind::duplicate_cell, c,
+                cell_name(mesh, c) + " has the same vertices as cell " + std::to_string(items[first].second));
   }
-  for_each_run(items, 3, [&](auto run) {
-    std::vector<Index> corners, cells;
-    for (const Index v : run[0].first)
-      if (v != kNoIndex) corners.push_back(v);
-    for (const auto& item : run) cells.push_back(item.second);
-    defects.add(MeshDefect::Kind::face_of_many_cells, cells[0],
-                "face " + number_list(corners) + " belongs to the cells " + number_list(cells));
-  });
-  return defects.size() == before;
+  return good;
 }
 
 void check_jacobians(const VolumeMesh& mesh, DefectList& defects) {

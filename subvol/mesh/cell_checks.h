@@ -22,9 +22,6 @@ void check_positions(const VolumeMesh& mesh, DefectList& defects);
 /// names a vertex twice.
 bool check_cell_vertices(const VolumeMesh& mesh, DefectList& defects);
 
-/// Checks that no face belongs to more than two cells. Returns false if one does.
-bool check_shared_faces(const VolumeMesh& mesh, DefectList& defects);
-
 /// Checks that the Jacobian determinants at the corners of all cells are positive.
 void check_jacobians(const VolumeMesh& mesh, DefectList& defects);
 

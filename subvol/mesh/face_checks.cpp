@@ -121,6 +121,31 @@ int num_fans(const MeshTopology& topology, Index v, std::span<const Index> faces
 
 }  // namespace
 
+bool check_shared_faces(const VolumeMesh& mesh, DefectList& defects) {
+  const std::size_t before = defects.size();
+  std::vector<std::pair<FaceKey, Index>> items;  // each face of each cell, with the cell
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const CellTopology& local = cell_topology(mesh.kinds[c]);
+    for (int f = 0; f < local.num_faces; ++f) {
+      std::array<Index, 4> corners;
+      for (int i = 0; i < local.face_sizes[f]; ++i) corners[i] = mesh.cell(c)[local.faces[f][i]];
+      items.push_back({face_key({corners.data(), std::size_t(local.face_sizes[f])}), static_cast<Index>(c)});
+    }
+  }
+  std::sort(items.begin(), items.end());
+  for (std::size_t first = 0, last; first < items.size(); first = last) {
+    for (last = first + 1; last < items.size() && items[last].first == items[first].first;) ++last;
+    if (last - first < 3) continue;
+    std::vector<Index> corners, cells;
+    for (const Index v : items[first].first)
+      if (v != kNoIndex) corners.push_back(v);
+    for (std::size_t i = first; i < last; ++i) cells.push_back(items[i].second);
+    defects.add(MeshDefect::Kind::face_of_many_cells, cells[0],
+                "face " + number_list(corners) + " belongs to the cells " + number_list(cells));
+  }
+  return defects.size() == before;
+}
+
 void check_conformity(const VolumeMesh& mesh, const MeshTopology& topology, DefectList& defects) {
   const TriangleFaces triangles(topology);
   check_quads(topology, triangles, defects);

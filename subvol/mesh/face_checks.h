@@ -6,7 +6,13 @@
 
 namespace subvol::internal {
 
-// These checks of how the cells of a mesh meet add what they find to `defects`. topology: of this mesh.
+// These checks of how the cells of a mesh meet add what they find to `defects`.
+
+/// Checks that no face belongs to more than two cells. Returns false if one does. Needs no topology, but vertex numbers
+/// in range.
+bool check_shared_faces(const VolumeMesh& mesh, DefectList& defects);
+
+// The others expect that no face belongs to more than two cells. topology: of this mesh.
 
 /// Checks that no boundary quad stands against triangles, and that no vertex hangs in a boundary edge of a cell without
 /// it. Cost: sorts of the triangles.

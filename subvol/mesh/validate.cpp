@@ -12,12 +12,6 @@ namespace subvol {
 
 using namespace internal;
 
-namespace {
-
-using Kind = MeshDefect::Kind;
-
-}  // namespace
-
 std::vector<MeshDefect> validate(const VolumeMesh& mesh) {
   DefectList defects;
   if (check_array_sizes(mesh, defects) && check_vertex_numbers(mesh, defects)) {
@@ -37,6 +31,7 @@ std::vector<MeshDefect> validate(const VolumeMesh& mesh) {
 }
 
 void require_valid(const VolumeMesh& mesh, const std::string& what, InvertedCells inverted) {
+  using Kind = MeshDefect::Kind;
   for (const MeshDefect& defect : validate(mesh)) {
     const bool is_allowed = defect.kind == Kind::unused_vertex ||
                             (defect.kind == Kind::inverted_cell && inverted == InvertedCells::allowed);
@@ -52,6 +47,7 @@ void require_groups(const VolumeFaceGroups& groups, const std::string& what) {
 }
 
 const char* to_string(MeshDefect::Kind kind) {
+  using Kind = MeshDefect::Kind;
   switch (kind) {
     case Kind::no_cells: return "no_cells";
     case Kind::size_mismatch: return "size_mismatch";

@@ -130,8 +130,8 @@ struct Parts {
 class LeastWhole {
  public:
   void add(double value) {
-    constexpr double kError = 0.02;  // of two winding numbers
-    const double whole = std::max(0.0, std::round(value)), upper = std::max(0.0, std::round(value + kError));
+    constexpr double kWindingError = 0.02;  // of two winding numbers
+    const double whole = std::max(0.0, std::round(value)), upper = std::max(0.0, std::round(value + kWindingError));
     if (any_ < 0 || upper < any_) any_ = upper;
     if (std::abs(value - whole) <= kClearlyWhole && (clear_ < 0 || whole < clear_)) clear_ = whole;
   }

@@ -40,7 +40,7 @@ class RegionFinder {
   }
 
   void number_regions(const SpaceCells& space) {
-    constexpr double kMostly = 0.5;  // share of a part's area
+    constexpr double kLeastFacingShare = 0.5;  // of `SpaceCells::facing`
     // Parts that contain others come first.
     std::vector<std::size_t> order(space.parts.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -61,10 +61,10 @@ class RegionFinder {
         joined[part.outer] = joined[*part.inside];
         const bool in_region = is_region[joined[*part.inside]] != 0;
         is_void = rule_ == RegionRule::automatic && in_region && is_manifold &&
-                  space.facing(p) * root_facing[p] < -kMostly && !has_copies(part);
+                  space.facing(p) * root_facing[p] < -kLeastFacingShare && !has_copies(part);
         if (in_region && !is_void && is_manifold && rule_ == RegionRule::automatic) ++nested_;
       } else {
-        root_facing[p] = is_manifold && space.facing(p) < -kMostly ? -1 : 1;
+        root_facing[p] = is_manifold && space.facing(p) < -kLeastFacingShare ? -1 : 1;
       }
       for (const std::size_t c : part.cells)
         if (c != part.outer) is_region[c] = !is_void && space.cells[c].has_volume();

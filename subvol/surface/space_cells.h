@@ -23,14 +23,15 @@ struct SpaceCell {
   bool has_volume() const;
 };
 
-/// A part of a surface, whose triangles edges connect, and the cells that it divides space into.
+/// Triangles of a surface that edges connect, and the cells into which they divide space.
 struct PartWithCells {
   std::vector<std::size_t> cells;  ///< places in `SpaceCells::cells`
   std::size_t outer = 0;           ///< of these, the one around the part
   std::vector<Index> triangles;
-  bool has_curves = false;            ///< edges of more than two triangles
-  double own_volume = 0;              ///< sum over its triangles as they are oriented
-  std::optional<std::size_t> inside;  ///< the cell of another part that it lies in
+  bool has_curves = false;  ///< edges of more than two triangles
+  double own_volume = 0;    ///< sum over its triangles as they are oriented
+  /// Place in `SpaceCells::cells` of the smallest cell of another part that contains this one; nothing: there is none.
+  std::optional<std::size_t> inside;
   Eigen::AlignedBox3d box;
 };
 

@@ -166,7 +166,7 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
   constexpr int kLinesOfCell = 4;  // as by default
   // Least fraction of a cell that belongs to the solid. Counts cost |log(share of the count asked for)| times
   // kCountWeight, apart from the first kFreeCount.
-  constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
+  constexpr double kWantedFraction = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
   constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
   Candidate best{frame, std::move(grid), {}, 0, 0};
   std::vector<double> fractions = solid_fractions(solid_.surface, best.grid, kLinesOfCell, &stop_);
@@ -178,7 +178,7 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
     VoxelGoal goal{fractions, threshold, solid_.topology, &stop_};
     std::optional<VoxelSolid> solid = start_solid(start, best.grid.cells, VertexRule::pillowable, goal);
     if (!solid || stop_.is_stopped()) return;
-    goal.threshold = kWanted;
+    goal.threshold = kWantedFraction;
     evolve(*solid, goal);
     reach_thin_parts(*solid, goal);
     if (stop_.is_stopped()) return;
@@ -193,8 +193,8 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
     best.kept.assign(solid->filled().begin(), solid->filled().end());
   };
   for (double threshold : kThresholds) look_at(VoxelStart::cut, threshold);
-  look_at(VoxelStart::grown, kWanted);
-  look_at(VoxelStart::shrunk, kWanted);
+  look_at(VoxelStart::grown, kWantedFraction);
+  look_at(VoxelStart::shrunk, kWantedFraction);
   if (best.kept.empty()) return std::nullopt;
   return best;
 }
@@ -286,8 +286,8 @@ bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result,
                  double fraction_share) {
   constexpr std::size_t kMostBatch = 16, kLeastBatch = 4;  // grids between two calls of the progress callback
   constexpr double kEnoughCandidates = 200;                // valid ones, after which a better one hardly ever turns up
-  constexpr double kUsual = 10'000;  // cells; of larger grids, which differ less, fewer are tried in proportion
-  const double share = std::min(1.0, kUsual / cells_);
+  constexpr double kUsualCells = 10'000;  // of larger grids, which differ less, fewer are tried in proportion
+  const double share = std::min(1.0, kUsualCells / cells_);
   const double enough = share * kEnoughCandidates;
   const auto batch = std::max(kLeastBatch, static_cast<std::size_t>(share * kMostBatch));
   const std::vector<Placement> all = placements();

@@ -75,8 +75,8 @@ class LevelChoice {
   /// Returns all of some items, or some hundreds that are evenly spread: each is compared with all edges of a level.
   template <class Item>
   static std::vector<Item> sample(const std::vector<Item>& items) {
-    constexpr std::size_t kLevelSamples = 300;  // items
-    const std::size_t step = std::max<std::size_t>(1, items.size() / kLevelSamples);
+    constexpr std::size_t kLeastLevelSamples = 300;
+    const std::size_t step = std::max<std::size_t>(1, items.size() / kLeastLevelSamples);
     std::vector<Item> some;
     for (std::size_t i = 0; i < items.size(); i += step) some.push_back(items[i]);
     return some;
@@ -153,13 +153,13 @@ SharpEdges sharp_edges(const TriangleMesh& surface, const Mat3& frame) {
 /// True if two sharp edges meet at a vertex without a corner, and neither leads farther along an axis, or neither
 /// farther back.
 bool is_turn(const SharpEdges& sharp, std::size_t vertex, Index axis, double tolerance) {
-  constexpr double kSmooth = -0.64;  // cosine between the edges: 130 degrees
+  constexpr double kSmoothTurnCosine = -0.64;  // cosine between the edges: 130 degrees
   if (sharp.neighbors[vertex].size() != 2) return false;
   const Vec3& p = sharp.positions[vertex];
   const auto direction_to = [&](std::size_t i) {
     return (sharp.positions[sharp.neighbors[vertex][i]] - p).normalized();
   };
-  if (direction_to(0).dot(direction_to(1)) > kSmooth) return false;
+  if (direction_to(0).dot(direction_to(1)) > kSmoothTurnCosine) return false;
   const auto leads_on = [&](double direction) {
     return std::ranges::any_of(sharp.neighbors[vertex], [&](Index w) {
       return direction * (sharp.positions[w][axis] - sharp.positions[vertex][axis]) >= tolerance;

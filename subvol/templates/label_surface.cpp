@@ -142,7 +142,8 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels, bool keeps_regions) {
 }
 
 VoxelLabels LabelSheets::cleaned() {
-  constexpr int kSpeckRepairRounds = 4;  // making points good may leave specks, and dropping these may make points bad
+  // Making points good may leave specks, and dropping these may make points bad.
+  constexpr int kMostSpeckRepairRounds = 4;
   const auto [nx, ny, nz] = grid_.counts;
   VoxelLabels labels({nx + 2 * kRim, ny + 2 * kRim, nz + 2 * kRim}, static_cast<int>(values_.size()),
                      VertexRule::manifold);
@@ -157,10 +158,10 @@ VoxelLabels LabelSheets::cleaned() {
           given[c] = 1 + static_cast<int>(std::ranges::lower_bound(values_, value) - values_.begin());
         labels.set(c, given[c]);
       }
-  const auto share = [&](int label, Index cell) {  // a voxel is much more its own label than that of a neighbor
-    constexpr double kNeighbor = 0.5 / 26;         // half of the share, for each of the 26 neighbors
+  const auto share = [&](int label, Index cell) {     // a voxel is much more its own label than that of a neighbor
+    constexpr double kNeighborVoxelShare = 0.5 / 26;  // half of the share, for each of the 26 neighbors
     double sum = given[cell] == label ? 0.5 : 0;
-    for (const Index offset : labels.all_offsets()) sum += given[cell + offset] == label ? kNeighbor : 0;
+    for (const Index offset : labels.all_offsets()) sum += given[cell + offset] == label ? kNeighborVoxelShare : 0;
     return sum;
   };
   specks_ = drop_specks(labels, false);
@@ -172,7 +173,7 @@ VoxelLabels LabelSheets::cleaned() {
       throw InputError("segmentation: label " + std::to_string(values_[r]) + " has only specks of fewer than " +
                        std::to_string(options_.least_voxels) + " voxels");
   std::vector<char> changes(labels.num_cells(), 0);
-  for (int round = 0; round < kSpeckRepairRounds; ++round) {
+  for (int round = 0; round < kMostSpeckRepairRounds; ++round) {
     // An edge of four faces may stay. It does no harm.
     make_points_good(labels, share, changes, &stop_);
     if (stop_.is_stopped()) break;
@@ -273,10 +274,10 @@ void LabelSheets::find_neighbors() {
 }
 
 void LabelSheets::smooth() {
-  constexpr double kForth = 0.5, kBack = -0.53, kMostSmoothingMove = 1;  // voxels
+  constexpr double kShrinkingStep = 0.5, kInflatingStep = -0.53, kMostSmoothingMove = 1;  // voxels
   std::vector<Vec3> next(positions_.size());
   for (int round = 0; round < options_.rounds && !stop_.is_stopped(); ++round)
-    for (const double step : {kForth, kBack}) {
+    for (const double step : {kShrinkingStep, kInflatingStep}) {
       for (std::size_t v = 0; v < positions_.size(); ++v) {
         next[v] = positions_[v];
         const std::size_t count = offsets_[v + 1] - offsets_[v];

@@ -105,12 +105,12 @@ class RegionSearch {
 /// Returns the edge length for which volume / size^3 cells, and a layer of cells on the sheets' sides, are as many as
 /// requested.
 double RegionSearch::size_for(double cells, bool counts_pillow) const {
-  constexpr double kStairs = 1.4;  // area of a staircase, as a multiple of the smooth surface's
+  constexpr double kStairsAreaFactor = 1.4;  // area of a staircase, as a multiple of the smooth surface's
   double low = std::cbrt(volume_ / cells), high = 8 * low;
   if (!counts_pillow) return low;
   for (int i = 0; i < 40; ++i) {
     const double size = std::sqrt(low * high);
-    (volume_ / std::pow(size, 3) + kStairs * area_ / (size * size) > cells ? low : high) = size;
+    (volume_ / std::pow(size, 3) + kStairsAreaFactor * area_ / (size * size) > cells ? low : high) = size;
   }
   return high;
 }
@@ -220,12 +220,12 @@ RegionSearch::Faults RegionSearch::faults_of(const VoxelLabels& labels, const Re
 }
 
 bool RegionSearch::raise_weights(std::span<const char> is_wrong, double cell_length, std::vector<double>& weights) {
-  constexpr double kRegionWeightRaise = 1.7, kThinRegionCells = 4;  // regions that are thicker need no weight
+  constexpr double kRegionWeightRise = 1.7, kThinRegionCells = 4;  // regions that are thicker need no weight
   bool raised = false;
   for (std::size_t r = 0; r < is_wrong.size(); ++r) {
     misses_[r] += is_wrong[r] != 0;
     if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThinRegionCells * cell_length) continue;
-    weights[r + 1] *= kRegionWeightRaise;
+    weights[r + 1] *= kRegionWeightRise;
     raised = true;
   }
   return raised;
@@ -272,7 +272,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   // Share of the count asked for, or its inverse, beyond which the size is corrected.
   constexpr double kMostUncorrectedShare = 1.25;
   constexpr std::array<double, 3> kCubeSizes{1, 0.95, 1.06};
-  constexpr std::array<double, 2> kOffsets{0, 0.5};
+  constexpr std::array<double, 2> kCubeGridOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
   const auto labeled_cubes = [&](const Mat3& frame, double size, double offset) -> std::optional<LabeledGrid> {
     const Eigen::AlignedBox3d box = box_in(frame, surface_.mesh);
@@ -283,7 +283,7 @@ std::optional<LabeledGrid> RegionSearch::best_of_cubes(double cells, double most
   std::optional<LabeledGrid> best;
   for (const double factor : kCubeSizes)
     for (const Mat3& frame : frames)
-      for (const double offset : kOffsets) {
+      for (const double offset : kCubeGridOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
         std::optional<LabeledGrid> found = labeled_cubes(frame, factor * size, offset);
         if (!found) continue;

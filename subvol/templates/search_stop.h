@@ -20,9 +20,9 @@ class SearchStop {
   bool is_stopped() {
     if (stopped_.load(std::memory_order_relaxed)) return true;
     if (!goes_on_ || std::this_thread::get_id() != owner_) return false;
-    constexpr auto kSearchQuestionInterval = std::chrono::milliseconds(50);
+    constexpr auto kCancelCheckInterval = std::chrono::milliseconds(50);
     const auto now = std::chrono::steady_clock::now();
-    if (now - asked_ < kSearchQuestionInterval) return false;
+    if (now - asked_ < kCancelCheckInterval) return false;
     asked_ = now;
     if (!goes_on_()) stopped_.store(true, std::memory_order_relaxed);
     return stopped_.load(std::memory_order_relaxed);
@@ -30,8 +30,8 @@ class SearchStop {
 
   /// Returns true if the search is to end; asks at every 4096th count only, for loops over millions of cells.
   bool is_stopped_at(std::size_t count) {
-    constexpr std::size_t kSearchCountsBetweenQuestions = 4096;
-    return count % kSearchCountsBetweenQuestions == 0 && is_stopped();
+    constexpr std::size_t kCountsPerCancelCheck = 4096;
+    return count % kCountsPerCancelCheck == 0 && is_stopped();
   }
 
   /// Asks until all work is done: for the thread that asks, once it has no work left itself.

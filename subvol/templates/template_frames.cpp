@@ -87,8 +87,8 @@ Mat3 facing_frame(const std::vector<Facet>& facets) {
 
 /// True if the axes agree, in any order and direction.
 bool same_axes(const Mat3& a, const Mat3& b) {
-  constexpr double kSame = 0.999;  // cosine of 2.5 degrees
-  return ((a.transpose() * b).cwiseAbs().colwise().maxCoeff().array() > kSame).all();
+  constexpr double kSameAxesCosine = 0.999;  // cosine of 2.5 degrees
+  return ((a.transpose() * b).cwiseAbs().colwise().maxCoeff().array() > kSameAxesCosine).all();
 }
 
 }  // namespace

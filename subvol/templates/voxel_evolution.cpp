@@ -156,7 +156,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
 }
 
 bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
-  constexpr int kMostVoxelFlips = 3;  // per cell: repairs may undo each other forever
+  constexpr int kMostFlipsPerVoxel = 3;  // repairs may undo each other forever
   std::vector<char> flips(solid.num_cells(), 0);
   std::vector<Index> bad;
   for (std::size_t p = 0; p < solid.num_points(); ++p)
@@ -172,7 +172,7 @@ bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
     Index best = kNoIndex;
     double best_score = 0;
     for (Index c : solid.cells_around(p)) {
-      if (c == kNoIndex || !solid.may_flip(c) || flips[c] >= kMostVoxelFlips) continue;
+      if (c == kNoIndex || !solid.may_flip(c) || flips[c] >= kMostFlipsPerVoxel) continue;
       const double score = solid.good_gain(c) + goal.gain(solid, c);
       if (best == kNoIndex || score > best_score) best = c, best_score = score;
     }
@@ -240,10 +240,10 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
 void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
   constexpr double kLeastFraction = 0.02;  // of a cell; less does not belong to a part that must be reached
   // Fewer steps from the solid are near enough. Rounds: one part that is reached may lead to the next.
-  constexpr int kLeastFarSteps = 2, kThinPartRounds = 3;
+  constexpr int kLeastFarSteps = 2, kMostThinPartRounds = 3;
   std::vector<char> given_up(solid.num_cells(), 0);
   std::vector<Index> previous, path, far;
-  for (int round = 0; round < kThinPartRounds; ++round) {
+  for (int round = 0; round < kMostThinPartRounds; ++round) {
     const std::vector<int> steps = voxel_steps(
         solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; },
         &previous, goal.stop);

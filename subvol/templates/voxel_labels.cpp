@@ -256,7 +256,7 @@ RegionTopology VoxelLabels::topology(SearchStop* stop) const {
 
 bool make_points_good(VoxelLabels& labels, const std::function<double(int label, Index cell)>& share,
                       std::vector<char>& changes, SearchStop* stop) {
-  constexpr int kMostLabelRepairs = 4;  // per cell: repairs may undo each other forever
+  constexpr int kMostRepairsPerVoxel = 4;  // repairs may undo each other forever
   std::vector<Index> bad;
   for (std::size_t p = 0; p < labels.num_points(); ++p)
     if (!labels.good(static_cast<Index>(p))) bad.push_back(static_cast<Index>(p));
@@ -272,7 +272,7 @@ bool make_points_good(VoxelLabels& labels, const std::function<double(int label,
     double best_score = 0;
     const auto around = labels.cells_around(p);
     for (const Index c : around) {
-      if (c == kNoIndex || !labels.may_set(c) || changes[c] >= kMostLabelRepairs) continue;
+      if (c == kNoIndex || !labels.may_set(c) || changes[c] >= kMostRepairsPerVoxel) continue;
       for (const Index other : around) {
         const int label = other == kNoIndex ? 0 : labels.label(other);
         if (label == labels.label(c)) continue;
@@ -292,10 +292,10 @@ bool make_points_good(VoxelLabels& labels, const std::function<double(int label,
 bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::span<const double> weights,
                    const RegionTopology& wanted, int voids, SearchStop* stop) {
   // Making points good may leave surplus parts, and dropping these may make points bad.
-  constexpr int kLabelRepairRounds = 4;
+  constexpr int kMostLabelRepairRounds = 4;
   for (std::size_t i = 0; i < labels.num_cells(); ++i) {
-    constexpr std::size_t kLabelCellsBetweenQuestions = 64;  // there may be thousands of regions
-    if (i % kLabelCellsBetweenQuestions == 0 && is_stopped(stop)) return false;
+    constexpr std::size_t kCellsPerCancelCheck = 64;  // there may be thousands of regions
+    if (i % kCellsPerCancelCheck == 0 && is_stopped(stop)) return false;
     const auto c = static_cast<Index>(i);
     if (!labels.may_set(c)) continue;
     double sum = 0, largest = 0;
@@ -309,7 +309,7 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
   }
   std::vector<char> changes(labels.num_cells(), 0);
   const auto share_of = [&](int label, Index cell) { return share(fractions, label, cell); };
-  for (int round = 0; round < kLabelRepairRounds; ++round) {
+  for (int round = 0; round < kMostLabelRepairRounds; ++round) {
     if (!make_points_good(labels, share_of, changes, stop)) return false;
     bool changed = false;
     for (int r = 1; r <= labels.num_regions(); ++r)
@@ -323,7 +323,7 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
 }
 
 void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* stop) {
-  constexpr int kMostLabelChanges = 2;           // of a voxel, so that the evolution ends
+  constexpr int kMostChangesPerVoxel = 2;        // so that the evolution ends
   using Entry = std::tuple<double, Index, int>;  // gain, cell, label
   const auto less = [](const Entry& a, const Entry& b) {
     if (std::get<0>(a) != std::get<0>(b)) return std::get<0>(a) < std::get<0>(b);
@@ -332,7 +332,7 @@ void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* st
   std::priority_queue<Entry, std::vector<Entry>, decltype(less)> queue(less);
   std::vector<char> changes(labels.num_cells(), 0);
   const auto offer = [&](Index c) {
-    if (!labels.may_set(c) || changes[c] >= kMostLabelChanges) return;
+    if (!labels.may_set(c) || changes[c] >= kMostChangesPerVoxel) return;
     const int old = labels.label(c);
     std::array<int, 6> around{}, found{};
     for (std::size_t f = 0; f < 6; ++f) around[f] = labels.label(c + labels.face_offsets()[f]);
@@ -347,7 +347,7 @@ void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* st
     const auto [gain, c, label] = queue.top();
     queue.pop();
     const double now = share(fractions, label, c) - share(fractions, labels.label(c), c);
-    if (now != gain || changes[c] >= kMostLabelChanges || !labels.is_simple(c, label)) continue;
+    if (now != gain || changes[c] >= kMostChangesPerVoxel || !labels.is_simple(c, label)) continue;
     labels.set(c, label);
     ++changes[c];
     for (const Index offset : labels.all_offsets()) offer(c + offset);
