@@ -215,8 +215,7 @@ bool AutomaticDriver::relax_last_trial() {
 }
 
 bool AutomaticDriver::polish() {
-  // By which the least scaled Jacobian asked for rises from one lift to the next.
-  constexpr double kPolishQualityStep = 0.05;
+  constexpr double kPolishQualityStep = 0.05;  // rise of the least scaled Jacobian asked for, from one lift to the next
   // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
   constexpr double kPolishDistanceGrowth = 1.2, kPolishToleranceShare = 0.02;
   // If more than this share of the cells is below a quality, lifting them moves most of the mesh. A vertex of a cage
