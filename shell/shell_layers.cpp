@@ -141,7 +141,7 @@ int number_of_layers(double thickness, double first_height, double growth) {
 
 void require_visible_layers(const char* owner, const PolygonMesh& surface, double thickness, int num_layers,
                             double growth) {
-  // Of the largest coordinate: some hundred units of its last digit.
+  // This share of the largest coordinate is some hundred units of its last digit.
   constexpr double kLeastVisibleThicknessShare = 1e-13;
   double largest = 0;
   for (const Vec3& p : surface.positions) largest = std::max(largest, p.lpNorm<Eigen::Infinity>());

@@ -48,7 +48,8 @@ class SimplexModels {
       std::uint8_t left_out;
     };
     std::vector<Function> functions;
-    /// Of values at 2 kMostSimplexTiers slot + tier; of gradients kMostSimplexTiers further on.
+    /// Errors of the models. That of a value is at 2 kMostSimplexTiers slot + tier, and that of its gradient follows
+    /// kMostSimplexTiers entries later.
     std::vector<double> errors;
     double error(std::size_t slot, int tier) const { return errors[2 * kMostSimplexTiers * slot + tier]; }
     double gradient_error(std::size_t slot, int tier) const {

@@ -62,7 +62,7 @@ class Bends {
   }
 
   bool is_crisp(Index v, Index w) const {
-    // Of the edge's angle: the edges around it must bend less than that.
+    // The edges around a crisp edge bend less than this share of its angle.
     constexpr double kMostNeighborBendShare = 1.0 / 3;
     const Index edge = find(v, w);
     if (edge == kNoIndex) return false;

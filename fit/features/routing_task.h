@@ -14,8 +14,8 @@
 
 namespace subvol::internal {
 
-/// What `route_features` is asked for, the same in all its attempts: the edges that paths may run along, the curves of
-/// the target, and which of them are eligible, that is, to be followed at all.
+/// Holds what all attempts of `route_features` share: the edges that paths may run along, the curves of the target, and
+/// which of these are eligible, that is, may be followed at all.
 class RoutingTask {
  public:
   /// mesh, features  must outlive the object. InputError: as `route_features`.

@@ -102,7 +102,7 @@ std::vector<double> shortest_edges(const VolumeMesh& mesh) {
   return shortest;
 }
 
-/// What is made flat: a mesh whose own cells are judged, or a cage, of whose mesh they are.
+/// Refers to what is made flat: a mesh whose own cells are judged, or a cage whose mesh's cells are judged.
 class Flattened {
  public:
   explicit Flattened(VolumeMesh& mesh) : moved(mesh) {}

@@ -84,7 +84,7 @@ std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const doubl
 }
 
 std::vector<Index> cells_between_sizes(std::span<const double> sizes) {
-  // Of the number of times that a cell was cut: 22 parts of one were cut 0.94 times.
+  // A count of cuts this close to a whole number is whole. It is not exact: 22 parts of a cell were cut 0.94 times.
   constexpr double kTimesCutRounding = 0.01;
   std::vector<Index> cells;
   for (std::size_t c = 0; c < sizes.size(); ++c) {

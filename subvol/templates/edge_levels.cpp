@@ -44,7 +44,7 @@ class LevelChoice {
   }
 
  private:
-  // In units of the size.
+  // These lengths are in units of the size.
   static constexpr double kThinnestLevelCell = 1.0 / 12, kLeastLevelLength = 4, kMostThinPartWidth = 0.6;
   static constexpr std::ptrdiff_t kLeastTurns = 2;     // the rims at both ends of a hole
   static constexpr double kLeastDiagonalShare = 0.25;  // of the diagonal: a line passes through the whole part
