@@ -63,6 +63,7 @@ set(entry_points
   fit/target/surface_diagnosis.h
   fit/target/surface_wrap.h
   fit/template_fit.h
+  fit/tuning/tuned_numbers.h
   fit/untangle_before_fit.h
   # Shells
   shell/curved_shell.h

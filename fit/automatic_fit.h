@@ -7,6 +7,7 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/target/feature_size.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/region_surface.h"
@@ -68,6 +69,7 @@ struct AutomaticFitOptions {
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   SolveControl control{};
   bool keep_states = false;  ///< fills AutomaticFitResult::states
+  Tuning tuning{};           ///< for experiments
 };
 
 /// A sharp edge of the target that no edges of the mesh follow, or not all along.

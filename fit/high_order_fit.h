@@ -5,6 +5,7 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/subdivision_fit.h"
+#include "subvol/fit/tuning/tuning.h"
 
 #include <optional>
 
@@ -47,6 +48,7 @@ struct HighOrderFitOptions {
   SolveControl control{};
   double memory_limit_bytes = 0;  ///< for the whole process, see `MemoryBudget`; 0: no limit
   bool keep_states = false;       ///< fills HighOrderFitResult::states
+  Tuning tuning{};                ///< for experiments
 };
 
 /// The curved mesh, and how the fit went.

@@ -5,6 +5,7 @@
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/solve_control.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <vector>
@@ -18,6 +19,7 @@ struct CurvedOptimizeOptions {
   bool fixed_boundary = false;
   double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
   SolveControl control{};
+  Tuning tuning{};  ///< for experiments
 };
 
 /// The mesh, and how the optimization went.

@@ -5,6 +5,7 @@
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/solve_control.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -32,6 +33,7 @@ struct OptimizeOptions {
   /// Largest acceptable distances, in percent of the diagonal, > 0.
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
   SolveControl control{};
+  Tuning tuning{};  ///< for experiments
 };
 
 /// The mesh, and how the optimization went.

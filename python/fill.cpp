@@ -43,6 +43,7 @@ class Filling {
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
     keywords_.take("max_iterations", options_.control.max_iterations);
     keywords_.take("time_limit", options_.control.time_limit_seconds);
+    take_tuning(keywords_, options_.tuning);
     take_chord(keywords_, writing_);
     keywords_.finish();
     target_ = triangles_from(target, "target");
@@ -122,8 +123,8 @@ class Filling {
 
 constexpr const char* kFillHelp =
     R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, regions='auto', wrap=None, keep_groups=False,
-    cage=False, levels=1, tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, checkpoint=None,
-    every=60.0, resume=None, chord=0.005, progress=None, threads=None)
+    cage=False, levels=1, tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, tune={},
+    checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Fills a surface with hexes that one can compute on, without a template: FillResult.
@@ -142,7 +143,7 @@ levels         times the template of a cage is subdivided to the mesh, 1 .. 6; a
 tolerance      mean distance to aim at, percent of the diagonal of the target's bounding box
 max_tolerance  the same for the largest distance
 
-max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
+max_iterations, time_limit, tune, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include "python/keywords.h"
 #include "subvol/fit/elements/basis.h"
 #include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/fit/untangle_before_fit.h"
 #include "subvol/subdivision/subdivision.h"
 
@@ -15,7 +16,10 @@ namespace subvol::python {
 Choices<BoundaryRule> boundary_rules();
 Choices<Basis> bases();
 
-/// Takes correspondence, lambda_close, solver, max_iterations, time_limit, for either kind of fit.
+/// Takes tune: tuned numbers by name. InputError: as `set_tuned_number`.
+void take_tuning(Keywords& keywords, Tuning& tuning);
+
+/// Takes correspondence, lambda_close, solver, max_iterations, time_limit, tune, for either kind of fit.
 template <class Options>
 void take_solver_options(Keywords& keywords, Options& options) {
   keywords.take("lambda_close", options.lambda_close);
@@ -24,6 +28,7 @@ void take_solver_options(Keywords& keywords, Options& options) {
   keywords.take("solver", options.solver, {{"newton", SolverKind::newton}, {"lbfgs", SolverKind::lbfgs}});
   keywords.take("max_iterations", options.control.max_iterations);
   keywords.take("time_limit", options.control.time_limit_seconds);
+  take_tuning(keywords, options.tuning);
 }
 
 /// Takes order, basis, adaptive, tolerance, and the above.

@@ -17,9 +17,12 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/template_fit.h"
+#include "subvol/fit/tuning/tuned_numbers.h"
 #include "subvol/fit/untangle_before_fit.h"
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 namespace subvol::python {
 namespace {
@@ -102,7 +105,7 @@ class Fit {
     keywords_.finish();
   }
 
-  /// Takes what says which edges are kept, for the fit and for a template that is made.
+  /// Takes what says which edges are kept, for the fit and for a template that is made, which also gets the tuning.
   template <class Options>
   void take_edges(Options& options) {
     keywords_.take("crease_angle", options.crease_angle_degrees);
@@ -112,6 +115,7 @@ class Fit {
       template_options_.follows_all_edges = true;
     }
     template_options_.keeps_groups = options.keeps_groups;
+    template_options_.tuning = options.tuning;
   }
 
   /// As in the program: a few inverted cells are made valid; the fit refuses a mesh in which at least half of the cells
@@ -120,7 +124,8 @@ class Fit {
     if (!cli::has_few_inverted_cells(*template_)) return;
     auto mesh = std::make_shared<VolumeMesh>(*template_);
     const UntangledStart untangled = work_.run("untangle", [&] {
-      OptimizeOptions options{.control = {.time_limit_seconds = time_limit_seconds}};
+      OptimizeOptions options{.control = {.time_limit_seconds = time_limit_seconds},
+                              .tuning = template_options_.tuning};
       work_.watch(options.control);
       return untangle_before_fit(*mesh, options);
     });
@@ -230,8 +235,8 @@ constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, keep_cage=True, crease_angle=None, keep_groups=False, lambda_far=1.0,
     quality=0.65, lambda_close=None, correspondence='closest', solver='newton', energy='hencky', point_weights='equal',
-    max_iterations=0, time_limit=0.0, order=None, basis='legendre', adaptive=False, keep_states=False, checkpoint=None,
-    every=60.0, resume=None, chord=0.005, progress=None, threads=None)
+    max_iterations=0, time_limit=0.0, tune={}, order=None, basis='legendre', adaptive=False, keep_states=False,
+    checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Deforms a template until its boundary reproduces a surface: FitResult.
@@ -266,6 +271,7 @@ point_weights   of points: all count alike, 'equal', or by the area they stand f
 keep_states     fills states of the result, which write("animation:FILE.glb", ...) shows
 max_iterations  per stage; 0: the schedule's own
 time_limit      seconds; 0: none
+tune            for experiments: tuned numbers of the method by name, such as {'fitting.coarse_lambda': 0.02}
 checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimizations end, and
                 however the call ends
 resume          checkpoint of an earlier call with the same target, template and options: goes on where that ended
@@ -282,6 +288,12 @@ Choices<BoundaryRule> boundary_rules() {
 }
 
 Choices<Basis> bases() { return {{"fourier", Basis::fourier}, {"legendre", Basis::legendre}}; }
+
+void take_tuning(Keywords& keywords, Tuning& tuning) {
+  std::map<std::string, double> numbers;
+  keywords.take("tune", numbers);
+  for (const auto& [name, value] : numbers) set_tuned_number(tuning, name, value);
+}
 
 HighOrderFitOptions high_order_options(Keywords& keywords) {
   HighOrderFitOptions options;

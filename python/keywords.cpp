@@ -114,6 +114,15 @@ void Keywords::read(const char* name, const py::object& given, double& value) co
   value = *number;
 }
 
+void Keywords::read(const char* name, const py::object& given, std::map<std::string, double>& values) const {
+  if (!py::isinstance<py::dict>(given)) refuse_type(name, given, "a dictionary of numbers");
+  for (const auto& [key, value] : given.cast<py::dict>()) {
+    std::string word;
+    read(name, py::reinterpret_borrow<py::object>(key), word);
+    read(name, py::reinterpret_borrow<py::object>(value), values[word]);
+  }
+}
+
 void Keywords::read(const char* name, const py::object& given, std::string& value) const {
   if (!py::isinstance<py::str>(given)) refuse_type(name, given, "a word");
   value = given.cast<std::string>();

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -65,6 +66,7 @@ class Keywords {
   void read(const char* name, const py::object& given, std::size_t& value) const;
   void read(const char* name, const py::object& given, double& value) const;
   void read(const char* name, const py::object& given, std::string& value) const;
+  void read(const char* name, const py::object& given, std::map<std::string, double>& values) const;
   template <class Value>
   void read(const char* name, const py::object& given, std::optional<Value>& value) const {
     read(name, given, value.emplace());

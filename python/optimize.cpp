@@ -84,6 +84,7 @@ class Optimization {
     keywords_.take("lambda_", options_.lambda);
     keywords_.take("max_iterations", options_.control.max_iterations);
     keywords_.take("time_limit", options_.control.time_limit_seconds);
+    take_tuning(keywords_, options_.tuning);
     keywords_.refuse({"chord"}, "goes with order only");
   }
 
@@ -104,6 +105,7 @@ class Optimization {
     keywords_.take("crease_angle", curving_.crease_angle_degrees);
     keywords_.take("max_iterations", curving_.control.max_iterations);
     keywords_.take("time_limit", curving_.control.time_limit_seconds);
+    take_tuning(keywords_, curving_.tuning);
     take_chord(keywords_, writing_);
   }
 
@@ -124,8 +126,10 @@ class Optimization {
   }
 
   void optimize_curved_cells(Optimized& result) {
-    CurvedOptimizeOptions options{
-        .fixed_boundary = options_.fixed_boundary, .quality = options_.quality, .control = options_.control};
+    CurvedOptimizeOptions options{.fixed_boundary = options_.fixed_boundary,
+                                  .quality = options_.quality,
+                                  .control = options_.control,
+                                  .tuning = options_.tuning};
     work_.watch(options.control);
     CurvedOptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
       options.control.log = log;
@@ -209,7 +213,7 @@ class Optimization {
 constexpr const char* kOptimizeHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
     max_tolerance=0.5, quality=0.65, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0,
-    checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
+    tune={}, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Untangles a mesh and improves its cells, or curves it: OptimizeResult.
@@ -227,7 +231,7 @@ order           curve the cells to this order, 2 .. 16; needs a target, and stra
                 None: the order that they have
 basis           of curved cells: 'legendre' or 'fourier'
 
-max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
+max_iterations, time_limit, tune, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
 
 }  // namespace
 

@@ -73,6 +73,7 @@ AutomaticFitOptions template_options(const FitArguments& arguments) {
   options.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
   options.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
   options.keeps_groups = arguments.fit.keeps_groups;
+  options.tuning = arguments.fit.tuning;
   return options;
 }
 
@@ -218,6 +219,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.distortion = distortion(arguments);
   fit.control = arguments.fit.control;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
+  fit.tuning = arguments.fit.tuning;
   return result;
 }
 
@@ -335,6 +337,7 @@ void add_fit_command(CLI::App& app, Action& action) {
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);
+  add_tune_option(*verb, arguments->fit.tuning);
   add_output_options(
       *verb, arguments->run,
       "Finest mesh, or its surface, by extension: " + output_formats() +

@@ -135,7 +135,8 @@ void HighOrderFitRun::describe_input() {
 
 void HighOrderFitRun::untangle() {
   const OptimizeOptions options{
-      .control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds, .log = checkpointing_->log()}};
+      .control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds, .log = checkpointing_->log()},
+      .tuning = arguments_.fit.tuning};
   const std::string& path = arguments_.template_mesh.path;
   try {
     if (template_.curved)

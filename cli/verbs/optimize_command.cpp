@@ -106,6 +106,7 @@ void add_optimize_command(CLI::App& app, Action& action) {
   add_goal_options(*verb, arguments->optimize);
   add_optimize_limits(*verb, arguments->optimize);
   add_curved_element_options(*verb, *arguments);
+  add_tune_option(*verb, arguments->optimize.tuning);
   add_output_options(
       *verb, arguments->run,
       "The mesh, or its surface, by extension: " + output_formats() +

@@ -32,8 +32,10 @@ CurvedOptimizeRun::CurvedOptimizeRun(const OptimizeArguments& arguments, const L
 void CurvedOptimizeRun::optimize() {
   before_ = measure_quality(file_.mesh);
   const OptimizeOptions& asked = arguments_.optimize;
-  CurvedOptimizeOptions options{
-      .fixed_boundary = asked.fixed_boundary, .quality = asked.quality, .control = asked.control};
+  CurvedOptimizeOptions options{.fixed_boundary = asked.fixed_boundary,
+                                .quality = asked.quality,
+                                .control = asked.control,
+                                .tuning = asked.tuning};
   const VolumeMesh labels = labels_of(file_);
   checkpointing_.emplace(run_, run_identity(verb_, {{"mesh", fingerprint(labels)}}));
   options.control.log = checkpointing_->log();

@@ -48,6 +48,7 @@ HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, cons
   fit.lambda_close = verb.count("--lambda") > 0 ? arguments.optimize.lambda : kCurvingLambda;
   fit.control = arguments.optimize.control;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
+  fit.tuning = arguments.optimize.tuning;
   return result;
 }
 

@@ -3,11 +3,14 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/scene_chord.h"
+#include "subvol/base/error.h"
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/target/surface_wrap.h"
+#include "subvol/fit/tuning/tuned_numbers.h"
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
 #include <initializer_list>
 #include <sstream>
 #include <utility>
@@ -28,6 +31,20 @@ Json typed(const std::vector<std::string>& texts) {
 }
 
 constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimit = std::size_t{1} << 50;
+
+/// Sets the number that "NAME=VALUE" names; returns what is wrong with it, if anything is.
+std::string set_number(Tuning& tuning, const std::string& word) {
+  const std::size_t equals = word.find('=');
+  const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
+  constexpr double kMostNumber = 1e12;  // tuned numbers have their own ranges
+  if (!is_number_in(value, -kMostNumber, kMostNumber)) return "must be NAME=VALUE with a number, not " + word;
+  try {
+    set_tuned_number(tuning, word.substr(0, equals), std::stod(value));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
 
 /// True if an option that excludes this one was given.
 bool is_excluded(const CLI::Option& option) {
@@ -239,6 +256,21 @@ std::vector<std::string> unused_output_options(const CLI::App& verb, std::span<c
   warn_unless(is_vtu, {"--vtu-cells"}, "a .vtu");
   warn_unless(shows_limit, {"--limit"}, "a surface or a scene");
   return warnings;
+}
+
+void add_tune_option(CLI::App& verb, Tuning& tuning) {
+  const auto check = [](const std::string& word) -> std::string {
+    Tuning scratch;
+    return set_number(scratch, word);
+  };
+  const std::function<void(const std::vector<std::string>&)> set = [&tuning](const std::vector<std::string>& words) {
+    for (const std::string& word : words) set_number(tuning, word);
+  };
+  verb.add_option_function("--tune", set,
+                           "For experiments: set a tuned number of the method, such as fitting.coarse_lambda=0.02;\n"
+                           "docs/cli.md tells where their names are listed; may be given several times")
+      ->check(CLI::Validator(check, ""))
+      ->type_name("NAME=VALUE");
 }
 
 CLI::Validator number_in(double low, double high) {

@@ -6,6 +6,7 @@
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/surface/region_surface.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -51,6 +52,9 @@ RegionRule region_rule(const std::string& rule);
 
 /// --wrap (`FillingOptions::wrap_percent`), of a verb that has --regions.
 void add_wrap_option(CLI::App& verb, std::optional<double>& percent);
+
+/// --tune NAME=VALUE, which may be given several times.
+void add_tune_option(CLI::App& verb, Tuning& tuning);
 
 /// --map-tolerance.
 CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);

@@ -6,6 +6,7 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/solve_control.h"
 #include "subvol/fit/target/target_surface.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/subdivision/boundary_rule.h"
 
 #include <optional>
@@ -60,6 +61,7 @@ struct FitOptions {
   SolveControl control{};
   double memory_limit_bytes = 0;  ///< for the whole process, see `MemoryBudget`; 0: no limit
   bool keep_states = false;       ///< fills FitResult::states
+  Tuning tuning{};                ///< for experiments
 };
 
 }  // namespace subvol

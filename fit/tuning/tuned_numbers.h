@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/tuning/tuning.h"
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace subvol {
+
+/// A number of a `Tuning`.
+struct TunedNumber {
+  std::string name;  ///< part and member, such as "fitting.coarse_lambda"
+  double value = 0;
+};
+
+/// Returns all numbers, part by part, in the order in which they are declared.
+std::vector<TunedNumber> tuned_numbers(const Tuning& tuning);
+
+/// Sets the number with this name, such as "fitting.coarse_lambda".
+///
+/// value  between 0 and 1, both excluded, if the default is below 1, since such a number may be a share or a factor
+/// that
+///        has to shrink; otherwise from 1 to 1000 times the default. Whole if the number counts something.
+/// InputError: there is no such number, or the value is out of this range; the message names both.
+void set_tuned_number(Tuning& tuning, std::string_view name, double value);
+
+}  // namespace subvol
