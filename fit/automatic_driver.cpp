@@ -24,7 +24,9 @@ namespace subvol::internal {
 namespace {
 
 /// A cell with a lower scaled Jacobian than this is hopeless where it is: the surface gives way to it.
-double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kAcceptableQuality, options.quality); }
+double hopeless_quality(const AutomaticFitOptions& options) {
+  return std::min(options.tuning.automatic.acceptable_quality, options.quality);
+}
 
 }  // namespace
 
@@ -172,13 +174,14 @@ std::vector<Index> AutomaticDriver::hopeless_cells(bool may_meet) const {
 /// cells farther out, until there are none: there the cells take the room that they want, as on the grid. Returns false
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
-  constexpr int kMostRelaxationRounds = 12, kRelaxationSteps = 6;  // steps of each round
-  constexpr int kMostFruitlessRounds = 4;  // rounds without fewer hopeless cells: no success was seen after two
-  constexpr double kFirstSurfaceWeight = 10, kSurfaceWeightFactor = 0.1;  // factor from one round to the next
+  constexpr int kRelaxationSteps = 6;           // of each round
+  constexpr int kMostFruitlessRounds = 4;       // rounds without fewer hopeless cells: no success was seen after two
+  constexpr double kSurfaceWeightFactor = 0.1;  // from one round to the next
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
-  double surface = kFirstSurfaceWeight;
+  double surface = options_.tuning.automatic.first_surface_weight;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (int round = 0, fruitless = 0; round < kMostRelaxationRounds; ++round, surface *= kSurfaceWeightFactor) {
+  const int most_rounds = options_.tuning.automatic.most_relaxation_rounds;
+  for (int round = 0, fruitless = 0; round < most_rounds; ++round, surface *= kSurfaceWeightFactor) {
     const std::vector<Index> cells = hopeless_cells(round > 0 || meets_itself(result_.trials.back()));
     if (runner_.is_to_end()) {
       note_end_in("the relaxation of hopeless cells");
@@ -215,12 +218,9 @@ bool AutomaticDriver::relax_last_trial() {
 }
 
 bool AutomaticDriver::polish() {
-  constexpr double kPolishQualityStep = 0.05;  // rise of the least scaled Jacobian asked for, from one lift to the next
-  // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
-  constexpr double kPolishDistanceGrowth = 1.2, kPolishToleranceShare = 0.02;
-  // If more than this share of the cells is below a quality, lifting them moves most of the mesh. A vertex of a cage
-  // moves more cells.
-  constexpr double kMostPoor = 0.1, kMostPoorOfCage = 0.05;
+  constexpr double kPolishToleranceShare = 0.02;  // share of the tolerance that is always allowed
+  const AutomaticTuning& tuning = options_.tuning.automatic;
+  const double step = tuning.polish_quality_step;
   constexpr int kPointsPerDirection = 3;  // the corners and the points half-way between them
   if (!is_good() || !is_present_best() || last_polished_ == result_.chosen) return true;
   last_polished_ = result_.chosen;
@@ -228,14 +228,13 @@ bool AutomaticDriver::polish() {
   trial.is_polished = true;
   const double tolerance = options_.max_tolerance_percent;
   const double most_percent =
-      std::clamp(kPolishDistanceGrowth * trial.max_percent, kPolishToleranceShare * tolerance, tolerance);
+      std::clamp(tuning.polish_distance_growth * trial.max_percent, kPolishToleranceShare * tolerance, tolerance);
   bool going = true, reached = true, is_lifted = false;
-  for (int i = 1; going && reached && options_.quality + i * kPolishQualityStep < kMostQuality + kPolishQualityStep / 2;
-       ++i) {
-    const double goal = std::min(options_.quality + i * kPolishQualityStep, kMostQuality);
+  for (int i = 1; going && reached && options_.quality + i * step < kMostQuality + step / 2; ++i) {
+    const double goal = std::min(options_.quality + i * step, kMostQuality);
     const std::vector<double> least = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const auto poor = std::ranges::count_if(least, [goal](double quality) { return quality < goal; });
-    const double most = (cage_ ? kMostPoorOfCage : kMostPoor) * static_cast<double>(least.size());
+    const double most = (cage_ ? tuning.most_poor_of_cage : tuning.most_poor) * static_cast<double>(least.size());
     if (static_cast<double>(poor) > most) break;
     going = fit_level(trial.level, aiming_at(most_percent, late_quality_schedule(goal)), ", polished");
     reached = state_.merit >= 1;

@@ -47,7 +47,7 @@ class AutomaticDriver {
 
   const AutomaticFitTrial& best() const { return result_.trials[result_.chosen]; }
   /// Returns true if the best trial is good enough (`is_good_enough`).
-  bool is_good() const { return !result_.trials.empty() && is_good_enough(best()); }
+  bool is_good() const { return !result_.trials.empty() && is_good_enough(best(), options_.tuning.automatic); }
 
   /// Returns true if the present mesh is that of the best trial.
   bool is_present_best() const { return taken_best_ == result_.chosen || result_.chosen + 1 == result_.trials.size(); }

@@ -38,23 +38,16 @@ using namespace internal;
 
 namespace {
 
-constexpr double kMostRefinementGrowth = 1.5;  // of the number of cells, by cutting some of them
 /// Largest share of the cells allowed that a template may have if some of its cells are to be cut.
 constexpr double kMostShareOfGrid = 0.75;
 /// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest.
 constexpr int kMostRefinementRounds = 2;
-/// Largest number of routings of one grid. Each gives up edges at which the one before left poor cells.
-constexpr int kMostRoutings = 5;
 /// Numbers of cells, as shares of that of the first grid, of other grids on which edges are laid out. Whether a long
 /// edge finds a path depends on where the lines of the grid happen to lie: of twelve grids of about 15,000 cells, five
 /// lost one of 48 % of the diagonal of KlickyProbe_v0_2, and seven did not. Grids that are not through planes come
 /// last.
 constexpr std::array kOtherGrids{0.93, 0.87, 0.8, 0.73};
 constexpr std::array kOtherFreeGrids{1.0, 0.87};
-/// Largest number of long edges that the first grid may lose. Of five parts that lost more, no other grid lost none.
-constexpr std::size_t kMostLongLost = 2;
-/// Share of the area on planes from which on grids that are not through them are worse.
-constexpr double kMostAlignedShare = 0.4;
 
 /// An automatic fit of one solid: the search among templates.
 class AutomaticFit : AutomaticSolidDriver {
@@ -65,6 +58,7 @@ class AutomaticFit : AutomaticSolidDriver {
   AutomaticFitResult run();
 
  private:
+  const AutomaticTuning& tuning() const { return options_.tuning.automatic; }
   bool run_attempt(const AutomaticAttempt& attempt);
   bool run_smooth(const AutomaticAttempt& attempt);
   bool run_edges(const AutomaticAttempt& attempt);
@@ -79,10 +73,13 @@ class AutomaticFit : AutomaticSolidDriver {
   bool route_and_fit(const AutomaticFitTrial& described);
   bool is_worth_trying(const AutomaticAttempt& attempt) const {
     // A grid without planes is the grid of the attempt before.
-    return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMostAlignedShare);
+    return attempt.kind != AutomaticAttempt::Kind::edges ||
+           (aligned_share_ > 0 && aligned_share_ < tuning().most_aligned_share);
   }
   /// Number of cells up to which a fit is refined, if the number is free.
-  static double most_refined_cells() { return kMostRefinementGrowth * static_cast<double>(kAutomaticCells.back()); }
+  double most_refined_cells() const {
+    return tuning().most_refinement_growth * static_cast<double>(kAutomaticCells.back());
+  }
   /// More cells are tried on a surface without edges as long as an aim is missed at all: they cost little there.
   bool is_strict() const { return !follows_.any() && !options_.makes_cage; }
   bool ends_search() const {
@@ -129,14 +126,14 @@ bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
 /// the cage is subdivided to would tell the same, but has eight times as many cells. Returns false if the fit must end.
 bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
   double least_faults = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kMostRoutings; ++round) {
+  for (int round = 0; round < tuning().most_routings; ++round) {
     if (round > 0) lay_out(routing);
     if (!fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) return false;
     const std::vector<double> faults = faults_of_cells(true);
     const double sum = std::accumulate(faults.begin(), faults.end(), 0.0);
     if (sum >= least_faults) break;  // what was given up has not helped
     least_faults = sum;
-    if (round + 1 == kMostRoutings) break;  // the layout must be that of the routing's options
+    if (round + 1 == tuning().most_routings) break;  // the layout must be that of the routing's options
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults, routing)) break;
   }
   return true;
@@ -145,8 +142,9 @@ bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
 /// Fits the present layout, then others while edges have to be given up. Returns false if the fit must end.
 bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
   RoutingOptions routing;
+  routing.one_in = tuning().one_in;
   double least_merit = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kMostRoutings; ++round) {
+  for (int round = 0; round < tuning().most_routings; ++round) {
     if (round > 0) lay_out(routing);
     AutomaticFitTrial trial = described;
     if (options_.makes_cage && !fit_future_cage(routing)) {
@@ -193,7 +191,7 @@ bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells
   using Kind = AutomaticAttempt::Kind;
   std::vector<std::pair<Kind, double>> others;
   for (const double share : kOtherGrids) others.emplace_back(Kind::aligned, share);
-  if (aligned_share_ >= kMostAlignedShare)  // else an attempt with such a grid follows
+  if (aligned_share_ >= tuning().most_aligned_share)  // else an attempt with such a grid follows
     for (const double share : kOtherFreeGrids) others.emplace_back(Kind::edges, share);
   std::set<std::pair<Kind, std::size_t>> seen{{Kind::aligned, first.template_cells}};
   std::size_t num_grids = 1;
@@ -213,13 +211,10 @@ bool AutomaticFit::try_other_grids(const AutomaticAttempt& attempt, double cells
 
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
-  // A grid is first asked for this share of the cells allowed, since pads add cells; after a grid that was too large,
-  // the next one is asked for kRetryPaddedGridShare of what would have fitted.
-  constexpr double kRoomForPads = 0.5, kRetryPaddedGridShare = 0.95;
-  // Share of the edges that must find a path, or a finer grid is worth more than a fit.
-  constexpr double kLeastRoutedShare = 0.8;
+  // After a grid that was too large, the next one is asked for this share of what would have fitted.
+  constexpr double kRetryPaddedGridShare = 0.95;
   constexpr int kTries = 3;  // grids
-  double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
+  double asked = tuning().room_for_pads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
     std::optional<AutoTemplate> grid = make_grid(attempt.kind, asked);
     if (!grid) return !no_template_.empty();
@@ -232,14 +227,16 @@ bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
       asked *= kRetryPaddedGridShare * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
-    if (!attempt.is_last_count && routed_share(layout_->routing, edges_.features.curves) < kLeastRoutedShare) {
+    const double routed = routed_share(layout_->routing, edges_.features.curves);
+    if (!attempt.is_last_count && routed < tuning().least_routed_share) {
       skipped_.push_back(attempt);
       return true;
     }
     const std::size_t lost = num_long_lost();
+    const auto most_lost = static_cast<std::size_t>(tuning().most_long_lost);
     if (!route_and_fit(*described)) return false;
     const bool may_gain = attempt.is_last_count && attempt.kind == AutomaticAttempt::Kind::aligned && lost > 0 &&
-                          lost <= kMostLongLost && best().long_edges_lost > 0;
+                          lost <= most_lost && best().long_edges_lost > 0;
     return !may_gain || try_other_grids(attempt, asked, *described);
   }
 }
@@ -283,8 +280,8 @@ bool AutomaticFit::run_graded() {
 /// Returns false if the fit must end.
 bool AutomaticFit::run_refined() {
   const AutomaticFitTrial before = best();
-  const double most =
-      options_.cells ? static_cast<double>(*options_.cells) : kMostRefinementGrowth * static_cast<double>(before.cells);
+  const double most = options_.cells ? static_cast<double>(*options_.cells)
+                                     : tuning().most_refinement_growth * static_cast<double>(before.cells);
   SearchStop stop([this] { return !runner_.is_to_end(); });
   std::optional<SizedMesh> refined =
       refined_at_faults(result_.mesh, best_start_.sizes, faults_of_best(), static_cast<std::size_t>(most), &stop);

@@ -51,12 +51,12 @@ double cost_of_missed(std::size_t groups) {
 
 /// Returns true if a result is to be preferred to another one that misses so many groups.
 bool is_preferred(const TriangleMesh& target, const AutomaticFitResult& result, const AutomaticFitResult& other,
-                  std::size_t missed_by_other) {
+                  std::size_t missed_by_other, const AutomaticTuning& tuning) {
   if (result.trials.empty() || !is_valid(result.trials[result.chosen])) return false;
   const std::size_t missed = num_groups_missed(target, result.mesh);
   if (missed >= missed_by_other) return false;
   const AutomaticFitTrial& trial = result.trials[result.chosen];
-  return is_good_enough(trial) ||
+  return is_good_enough(trial, tuning) ||
          trial.merit + cost_of_missed(missed) <= other.trials[other.chosen].merit + cost_of_missed(missed_by_other);
 }
 
@@ -98,7 +98,7 @@ AutomaticFitResult fit_for_groups(const TriangleMesh& target, const AutomaticFit
     first.report.warnings.push_back(std::string("borders between groups are not followed: ") + error.what());
     return first;
   }
-  if (is_preferred(target, second, first, missed)) {
+  if (is_preferred(target, second, first, missed, options.tuning.automatic)) {
     add(second, first, true);
     return second;
   }

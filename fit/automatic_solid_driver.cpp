@@ -212,7 +212,7 @@ std::vector<double> AutomaticSolidDriver::faults_of_cells(bool may_meet) const {
   constexpr double kMeetingCellFault = 1;  // a cell that meets another one is worse than any cell of poor quality
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
-    faults.push_back(std::max(0.0, kAcceptableQuality - least));
+    faults.push_back(std::max(0.0, options_.tuning.automatic.acceptable_quality - least));
   if (may_meet)
     for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeetingCellFault;
   return cage_ ? cage_->sums_of_parts(faults) : faults;
@@ -253,7 +253,7 @@ std::vector<Fault> AutomaticSolidDriver::faults_of_best() const {
   std::vector<Index> poor = best_start_.poor;
   std::ranges::stable_sort(poor, std::less{}, [&](Index c) { return least[c]; });
   for (const Index c : poor)
-    if (least[c] < kEnoughQuality * options_.quality) faults.push_back({c});
+    if (least[c] < options_.tuning.automatic.enough_quality * options_.quality) faults.push_back({c});
   for (const Index c : best_start_.far) faults.push_back({c});
   return faults;
 }

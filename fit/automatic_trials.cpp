@@ -12,21 +12,6 @@
 
 namespace subvol::internal {
 
-namespace {
-
-/// No other template is tried below it: 95 % of the edges are followed within 0.1 %, if nothing else is missed.
-constexpr double kGoodMerit = 0.15;
-constexpr double kQualityWeight = 5;  // of the share of the quality in the merit
-/// Cost of a boundary that meets itself, and of cells that are not certified: so much that a valid trial wins, however
-/// many edges an invalid one follows.
-constexpr double kNotValid = 10;
-/// Cost of long edges that are not followed, of a feature that is lost, and of a solid of another volume: such a trial
-/// is far off, so that it is never good, is worth a refinement, and is chosen only if its cells are better by more than
-/// 0.3 of the quality aimed at. (At 0.6, parts ended with status 4 for 0.03 of the scaled Jacobian.)
-constexpr double kFarOff = 1.5;
-
-}  // namespace
-
 AutomaticFitOptions checked_options(AutomaticFitOptions options) {
   constexpr double kLeastQuality = 0.1;  // aims below it are taken as this one: shares of the aim need a divisor
   const auto in_range = [](const char* name, double value, double low, double high) {
@@ -44,22 +29,22 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
 }
 
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
-  // Weight of the share of edges that are not followed closely, and the most that each other miss counts.
-  constexpr double kEdgeWeight = 3, kMostMiss = 3;
+  const AutomaticTuning& tuning = options.tuning.automatic;
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
-  const double least_acceptable = std::min(kAcceptableQuality, options.quality);
+  const double least_acceptable = std::min(tuning.acceptable_quality, options.quality);
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
   const bool is_far_off =
       trial.long_edges_lost > 0 || trial.lost_feature || trial.solid_volume_percent > kFarOffSolidVolumePercent;
   return excess(trial.max_percent, options.max_tolerance_percent) +
-         excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
-         std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
-         std::min(kMostMiss, excess(trial.solid_volume_percent, kFarOffSolidVolumePercent)) +
-         kQualityWeight * (1 - trial.least_share) +
-         kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
-         kEdgeWeight * (1 - trial.within_share) + (is_far_off ? kFarOff : 0) +
-         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
+         excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(tuning.most_miss, missed) +
+         std::min(tuning.most_miss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
+         std::min(tuning.most_miss, excess(trial.solid_volume_percent, kFarOffSolidVolumePercent)) +
+         tuning.quality_weight * (1 - trial.least_share) +
+         tuning.quality_weight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
+         tuning.edge_weight * (1 - trial.within_share) + (is_far_off ? tuning.far_off : 0) +
+         (trial.self_intersections == std::size_t{0} ? 0 : tuning.not_valid) +
+         (trial.uncertified > 0 ? tuning.not_valid : 0);
 }
 
 double volume_difference_percent(const TriangleMesh& boundary, const TargetSurface& target) {
@@ -68,7 +53,7 @@ double volume_difference_percent(const TriangleMesh& boundary, const TargetSurfa
 }
 
 double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& options) {
-  const double acceptable = std::min(kAcceptableQuality, options.quality);
+  const double acceptable = std::min(options.tuning.automatic.acceptable_quality, options.quality);
   trial.self_intersections = 0;
   trial.least_scaled_jacobian = std::max(trial.least_scaled_jacobian, acceptable);
   trial.least_share = std::max(trial.least_share, acceptable / options.quality);
@@ -83,9 +68,10 @@ bool meets_distances(const AutomaticFitTrial& trial, const AutomaticFitOptions& 
   return trial.max_percent <= options.max_tolerance_percent && trial.mean_percent <= options.mean_tolerance_percent;
 }
 
-bool is_good_enough(const AutomaticFitTrial& trial) {
-  const double excused = trial.least_share >= kEnoughQuality ? kQualityWeight * (1 - trial.least_share) : 0;
-  return trial.merit - excused < kGoodMerit;
+bool is_good_enough(const AutomaticFitTrial& trial, const AutomaticTuning& tuning) {
+  const double excused =
+      trial.least_share >= tuning.enough_quality ? tuning.quality_weight * (1 - trial.least_share) : 0;
+  return trial.merit - excused < tuning.good_merit;
 }
 
 namespace {
@@ -95,7 +81,7 @@ bool is_long(const MissedEdge& edge) { return edge.length_percent > kLongEdgePer
 /// Returns true if a trial is better than the best one before. If it is that one polished and still good, the quality
 /// decides, unless it no longer meets the distances.
 bool is_better(const AutomaticFitTrial& trial, const AutomaticFitTrial& best, const AutomaticFitOptions& options) {
-  if (trial.is_polished && is_good_enough(trial) &&
+  if (trial.is_polished && is_good_enough(trial, options.tuning.automatic) &&
       (meets_distances(trial, options) || !meets_distances(best, options)))
     return trial.least_scaled_jacobian > best.least_scaled_jacobian;
   return trial.merit < best.merit;

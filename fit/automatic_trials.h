@@ -14,14 +14,6 @@
 
 namespace subvol::internal {
 
-/// No other template is tried either if the quality is what keeps a trial from being good, and reaches this share of
-/// the goal: larger templates have the same angles at sharp edges and irregular vertices.
-inline constexpr double kEnoughQuality = 0.85;
-
-/// Scaled Jacobian below which a cell is poor even at an acute corner, where less than the goal is asked for: edges of
-/// the target are given up for it.
-inline constexpr double kAcceptableQuality = 0.3;
-
 /// Portions of the work, for forecasts. An attempt takes `AutomaticAttempt::portion` of what is left. Of what is left
 /// of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit, and of
 /// each routing and relaxation.
@@ -49,7 +41,7 @@ inline bool meets_itself(const AutomaticFitTrial& trial) { return trial.self_int
 
 /// Returns true if a trial is so good that it is polished, and neither smaller cells nor, with edges to follow, another
 /// template is tried.
-bool is_good_enough(const AutomaticFitTrial& trial);
+bool is_good_enough(const AutomaticFitTrial& trial, const AutomaticTuning& tuning);
 
 /// Returns true if both distances are within those allowed.
 bool meets_distances(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);

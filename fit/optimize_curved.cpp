@@ -132,7 +132,7 @@ void CurvedOptimizer::find_sizes() {
   double volume = 0;
   for (const RegionQuality& region : measure_regions(mesh_, {}, nullptr).regions) volume += region.volume;
   std::vector<std::uint8_t> trusted;
-  for (const double least : quality_.cell_minima) trusted.push_back(least > kTrustedJacobian);
+  for (const double least : quality_.cell_minima) trusted.push_back(least > options_.tuning.optimize.trusted_jacobian);
   constexpr double kLeastVolume = 1e-9;  // of a mesh that is turned inside out
   ideal_boxes_ = interpolated_boxes(labels_, vertices, std::max(volume, kLeastVolume), trusted);
 }
@@ -222,7 +222,8 @@ bool CurvedOptimizer::untangle_cells() {
   const std::vector<Index>& left = quality_.certificate.not_certified;
   const auto untangle_part = [&](Part part, const char* name) {
     dynamic_cast<HighOrderEnergy&>(*part.problem.volume).set_most_own_emphasis(0);
-    const UntangleOptions options{.max_rounds = kMostUntanglingRounds, .patience = kUntanglingPatience};
+    const UntangleOptions options{
+        .max_rounds = kMostUntanglingRounds, .patience = kUntanglingPatience, .tuning = options_.tuning.optimize};
     const bool going =
         untangle(part.problem, part.space->num_cells(), options, runner_, record(name, part), part.x, report_).going;
     take(part);

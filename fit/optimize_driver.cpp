@@ -25,11 +25,6 @@ namespace subvol::internal {
 
 namespace {
 
-/// Correspondences of this length, as a share of the diagonal, count twice (`ClosestPointEnergy::emphasize_far`).
-constexpr double kFarDistance = 0.002;
-/// Least factor to which the weight of a cell is lowered for the sake of the distance.
-constexpr double kLeastRelief = 0.25;
-
 OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   const auto in_range = [](const char* name, double value, double low, double high) {
     require_in_range("OptimizeOptions", name, value, low, high);
@@ -136,7 +131,7 @@ void OptimizeDriver::find_sizes() {
   }
   std::vector<std::uint8_t> trusted;
   for (const double least : measure_quality(mesh_, kCornerPoints).cell_minima)
-    trusted.push_back(least > kTrustedJacobian);
+    trusted.push_back(least > options_.tuning.optimize.trusted_jacobian);
   ideal_boxes_ = interpolated_boxes(mesh_, mesh_.positions, volume, trusted);
 }
 
@@ -161,7 +156,7 @@ std::unique_ptr<SurfaceTerm> OptimizeDriver::surface_term(bool emphasize_far) co
                                                       kOptimizeTangentialWeight, points);
   if (!interfaces_.empty())
     surface->set_groups(groups_of_triangles(samples_.triangle_faces, face_groups_), target_.group_of_triangle);
-  if (emphasize_far) surface->emphasize_far(kFarDistance);
+  if (emphasize_far) surface->emphasize_far(options_.tuning.optimize.far_distance);
   surface->refine(refined_);
   if (!creases_.curves().empty())
     surface->add_creases(creases_.energy(samples_.crease_edges, samples_.points.size(),
@@ -216,7 +211,8 @@ bool OptimizeDriver::run_stage(const std::string& name, double lambda, int steps
 void OptimizeDriver::relieve_far_cells(std::span<const double> triangle_distances) {
   std::vector<std::uint8_t> far(mesh_.num_vertices(), 0);
   for (std::size_t t = 0; t < triangle_distances.size(); ++t) {
-    if (100 * triangle_distances[t] <= kMaxShareOfTolerance * options_.max_tolerance_percent) continue;
+    if (100 * triangle_distances[t] <= options_.tuning.optimize.max_share_of_tolerance * options_.max_tolerance_percent)
+      continue;
     for (const Index v : topology_.face(samples_.triangle_faces[t])) far[v] = 1;
   }
   for (std::size_t t = 0; t < refined_.size(); ++t) {
@@ -226,7 +222,7 @@ void OptimizeDriver::relieve_far_cells(std::span<const double> triangle_distance
   for (std::size_t c = 0; c < mesh_.num_cells(); ++c) {
     const auto cell = mesh_.cell(c);
     if (std::any_of(cell.begin(), cell.end(), [&](Index v) { return far[v] != 0; }))
-      relief_[c] = std::max(relief_[c] / 2, kLeastRelief);
+      relief_[c] = std::max(relief_[c] / 2, options_.tuning.optimize.least_relief);
   }
 }
 

@@ -24,9 +24,6 @@
 
 namespace subvol::internal {
 
-/// Largest relative change of a region's volume at which interfaces may slide.
-inline constexpr double kMostVolumeChange = 1e-3;
-
 /// Least rise of the least or the mean scaled Jacobian that is a gain; less is rounding.
 inline constexpr double kLeastJacobianGain = 1e-6;
 
@@ -36,10 +33,6 @@ inline constexpr double kOptimizeTangentialWeight = 0.003;
 /// Points per direction for energies and scaled Jacobians: the corners only, where cells are worst. The certificate
 /// detects cells that are inverted elsewhere, and these get more points.
 inline constexpr int kCornerPoints = 2;
-
-/// Distances are kept below these shares of the tolerances, since they are measured at samples, which miss the farthest
-/// places.
-inline constexpr double kMeanShareOfTolerance = 0.9, kMaxShareOfTolerance = 0.8;
 
 /// The base of `optimize_mesh`: the mesh with its features and interfaces, the minimizations on it, and its measures.
 /// All coordinates are normalized.
@@ -86,7 +79,7 @@ class OptimizeDriver {
            std::ranges::all_of(start_volumes_, [](double volume) { return volume > 0; });
   }
   double volume_change() const;
-  bool changes_volumes() const { return volume_change() > kMostVolumeChange; }
+  bool changes_volumes() const { return volume_change() > options_.tuning.optimize.most_volume_change; }
 
   OptimizeOptions options_;
   VolumeMesh mesh_;

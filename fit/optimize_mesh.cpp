@@ -31,16 +31,11 @@ namespace {
 
 /// Weight of the cells' shape against the surface while cells are untangled with a sliding boundary.
 constexpr double kUntangleLambda = 0.01;
-/// Cells with a lower scaled Jacobian may move the corner vertices of the surface's sharp edges, at first.
-constexpr double kPoorJacobian = 0.2;
 
 /// Estimates of the work: its share when untangling and the rounds end, the portion of the rest that the first quality
 /// stages take, and the steps of untangling.
 constexpr double kShareAfterUntangling = 0.25, kShareAfterRounds = 0.5, kFirstQualityPortion = 0.7;
 constexpr double kExpectedUntanglingSteps = 30;
-
-/// Largest relative change of a volume for which there is no warning.
-constexpr double kToldVolumeChange = 1e-4;
 
 /// State that a round has reached.
 struct Progress {
@@ -124,6 +119,7 @@ class MeshOptimizer : OptimizeDriver {
       return std::tie(num_uncertified, volume_change) < std::tie(other.num_uncertified, other.volume_change);
     }
   };
+  const OptimizeTuning& tuning() const { return options_.tuning.optimize; }
   Outcome outcome() const;
   /// Makes attempts that hold more and more until no region's volume changes, and takes the soundest. start: the state
   /// before. Returns false if the work must end.
@@ -133,8 +129,9 @@ class MeshOptimizer : OptimizeDriver {
   void take(Outcome reached);
 
   std::vector<Index> uncertified_;
-  double releases_below_ = kPoorJacobian;  ///< cells below it may move corners of sharp edges
-  bool gains_ended_ = false;               ///< true if the rounds ended because they no longer gained
+  /// Cells below this scaled Jacobian may move corners of sharp edges.
+  double releases_below_ = options_.tuning.optimize.poor_jacobian;
+  bool gains_ended_ = false;  ///< true if the rounds ended because they no longer gained
 };
 
 bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options) {
@@ -149,39 +146,39 @@ bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const Un
 bool MeshOptimizer::untangle_all() {
   runner_.work().begin_part(kShareAfterUntangling, kExpectedUntanglingSteps);
   const std::vector<Vec3> start = mesh_.positions;
-  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = 40, .patience = options_.fixed_boundary ? 6 : 2};
+  const UntangleOptions fixed{
+      .tangential_weight = 0, .max_rounds = 40, .patience = options_.fixed_boundary ? 6 : 2, .tuning = tuning()};
   if (!untangle_cells(Boundary::fixed, "untangle, boundary fixed", fixed)) return false;
   if (uncertified_.empty() || options_.fixed_boundary) return true;
   std::vector<Index> stuck = uncertified_;
   release_corners(stuck);
-  const UntangleOptions sliding{.tangential_weight = kOptimizeTangentialWeight, .max_rounds = 4};
+  const UntangleOptions sliding{.tangential_weight = kOptimizeTangentialWeight, .max_rounds = 4, .tuning = tuning()};
   if (!untangle_cells(Boundary::sliding, "untangle, boundary sliding", sliding)) return false;
   if (uncertified_.empty()) return true;
   stuck.insert(stuck.end(), uncertified_.begin(), uncertified_.end());
   release_features(stuck);
   mesh_.positions = start;
   return untangle_cells(Boundary::sliding, "untangle, sharp edges released",
-                        {.tangential_weight = kOptimizeTangentialWeight});
+                        {.tangential_weight = kOptimizeTangentialWeight, .tuning = tuning()});
 }
 
 /// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
-  // Ideal boxes and weights change after kImprovementRoundSteps steps: more steps toward those of before are lost.
-  constexpr int kFirstImprovementSteps = 4, kImprovementRoundSteps = 2, kMostImprovementRounds = 14;
+  const int first_steps = tuning().first_round_steps, round_steps = tuning().round_steps;
+  const int most_rounds = tuning().most_rounds;
   constexpr double kLeastShareOfLambda = 1.0 / 64;  // of the first lambda: six halvings
   double lambda = options_.lambda;
   Progress before;
-  runner_.work().begin_part(kShareAfterRounds,
-                            kFirstImprovementSteps + kImprovementRoundSteps * kMostImprovementRounds / 2);
-  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstImprovementSteps)) return false;
-  for (int round = 0; round < kMostImprovementRounds; ++round) {
+  runner_.work().begin_part(kShareAfterRounds, first_steps + round_steps * most_rounds / 2);
+  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, first_steps)) return false;
+  for (int round = 0; round < most_rounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kCornerPoints).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
-    const bool too_far = mean_percent_ > kMeanShareOfTolerance * options_.mean_tolerance_percent ||
+    const bool too_far = mean_percent_ > tuning().mean_share_of_tolerance * options_.mean_tolerance_percent ||
                          (held_ != Held::nothing && changes_volumes());
     if (too_far && lambda > kLeastShareOfLambda * options_.lambda) {
       lambda /= 2;
-    } else if (!now.gains_on(before, kMaxShareOfTolerance * options_.max_tolerance_percent)) {
+    } else if (!now.gains_on(before, tuning().max_share_of_tolerance * options_.max_tolerance_percent)) {
       gains_ended_ = true;
       break;
     }
@@ -193,7 +190,7 @@ bool MeshOptimizer::improve() {
       if (minima[c] < releases_below_) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
-    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kImprovementRoundSteps)) return false;
+    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, round_steps)) return false;
   }
   return true;
 }
@@ -201,8 +198,9 @@ bool MeshOptimizer::improve() {
 bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const {
   return now.uncertified <= before.uncertified && now.intersections <= before.intersections &&
          now.least_jacobian > before.least_jacobian &&
-         now.volume_change <= std::max(before.volume_change, kMostVolumeChange) &&
-         now.mean_percent <= std::max(before.mean_percent, kMeanShareOfTolerance * options_.mean_tolerance_percent) &&
+         now.volume_change <= std::max(before.volume_change, tuning().most_volume_change) &&
+         now.mean_percent <=
+             std::max(before.mean_percent, tuning().mean_share_of_tolerance * options_.mean_tolerance_percent) &&
          now.max_percent <= std::max(before.max_percent, options_.max_tolerance_percent);
 }
 
@@ -210,8 +208,8 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 /// was too far from, or of better cells at distances that are within the tolerances or no larger.
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
-  if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
-      now.mean_percent > std::max(start.mean_percent, mean_limit) ||
+  if (now.uncertified > 0 || now.intersections > start.intersections ||
+      now.volume_change > tuning().most_volume_change || now.mean_percent > std::max(start.mean_percent, mean_limit) ||
       now.max_percent > std::max(start.max_percent, max_limit))
     return false;
   const bool was_too_far = start.mean_percent > mean_limit || start.max_percent > max_limit;
@@ -224,14 +222,14 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
 /// Raises the least scaled Jacobian toward a goal; if the surface suffers, it counts more in another attempt. Returns
 /// false if the work must end.
 bool MeshOptimizer::raise_quality(double goal) {
-  constexpr double kMoreSurface = 10;        // factor on the weight of the surface in the second attempt
-  constexpr int kSurfaceWeightAttempts = 2;  // with its weight as it is, and with kMoreSurface times that
+  constexpr int kSurfaceWeightAttempts = 2;  // with its weight as it is, and with more
   const Measured before = measure();
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
   QualitySchedule schedule = fine_quality_schedule(goal);
   runner_.work().begin_portion(kFirstQualityPortion, 1, schedule.expected_steps());
-  schedule.most_distance = std::max(kMaxShareOfTolerance * options_.max_tolerance_percent, before.max_percent) / 100;
+  schedule.most_distance =
+      std::max(tuning().max_share_of_tolerance * options_.max_tolerance_percent, before.max_percent) / 100;
   for (int attempt = 0; attempt < kSurfaceWeightAttempts; ++attempt) {
     const std::size_t stages_before = report_.stages.size();
     const bool going = run_quality_stages(schedule);
@@ -240,7 +238,7 @@ bool MeshOptimizer::raise_quality(double goal) {
     report_.undo_stages(stages_before, report_.stages.size());
     if (!going) return false;
     if (options_.fixed_boundary) break;
-    schedule.give_surface_more_weight(kMoreSurface);
+    schedule.give_surface_more_weight(tuning().more_surface);
   }
   return true;
 }
@@ -248,11 +246,10 @@ bool MeshOptimizer::raise_quality(double goal) {
 /// Raises the least scaled Jacobian to the quality that was asked for and then, from there, beyond it. Returns false if
 /// the work must end.
 bool MeshOptimizer::raise_quality() {
-  constexpr double kQualityBeyondAim = 0.1;  // scaled Jacobian that is asked for beyond the aim, once that is reached
   if (options_.quality == 0) return true;
   if (!raise_quality(options_.quality)) return false;
   if (measure_quality(mesh_).min_scaled_jacobian < options_.quality) return true;
-  return raise_quality(std::min(kMostQuality, options_.quality + kQualityBeyondAim));
+  return raise_quality(std::min(kMostQuality, options_.quality + tuning().quality_beyond_aim));
 }
 
 /// Makes flat faces exactly so, unless the boundary is fixed. least_jacobian: of the start.
@@ -353,7 +350,7 @@ bool MeshOptimizer::repeat_while_poor(const VolumeMesh& original) {
   constexpr int kMostRepeats = 2;
   constexpr double kLeastRepeatGain = 0.01;  // of the least scaled Jacobian, for which there is another repeat
   if (options_.quality == 0 || !interfaces_.empty()) return true;
-  releases_below_ = std::max(kPoorJacobian, options_.quality);
+  releases_below_ = std::max(tuning().poor_jacobian, options_.quality);
   Measured before = measure();
   for (int i = 0; i < kMostRepeats && before.uncertified == 0 && before.least_jacobian < options_.quality; ++i) {
     Outcome reached = outcome();
@@ -383,16 +380,16 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   if (is_kept) {
     result.mesh.positions = target_.normalization.from_unit(mesh_.positions);
     if (held_ >= Held::interfaces)
-      report_.warnings.push_back(
-          formatted("%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
-                    held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * kMostVolumeChange));
+      report_.warnings.push_back(formatted(
+          "%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
+          held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * tuning().most_volume_change));
   } else {
     mesh_.positions = std::move(start_positions);
     report_.warnings.resize(warnings_before);
     report_.undo_stages(0, report_.stages.size());
     gains_ended_ = true;
   }
-  if (const double change = volume_change(); keeps_volumes() && change > kToldVolumeChange)
+  if (const double change = volume_change(); keeps_volumes() && change > tuning().told_volume_change)
     report_.warnings.push_back(
         formatted("the volume of %s changed by %.2g %%", interfaces_.empty() ? "the mesh" : "a region", 100 * change));
   if (options_.fixed_boundary)

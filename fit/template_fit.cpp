@@ -45,7 +45,7 @@ AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions 
       best->report.stop_reason = reason;
       best->report.explanation = std::move(made.report.explanation);
     }
-    if (is_ended || (is_made && is_good_enough(best->trials[best->chosen]))) break;
+    if (is_ended || (is_made && is_good_enough(best->trials[best->chosen], options.tuning.automatic))) break;
   }
   if (best->mesh.num_cells() > 0) FollowedCreases().keep_from_folding(best->mesh);
   return std::move(*best);

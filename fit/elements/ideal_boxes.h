@@ -27,9 +27,6 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
 /// volume  > 0, in the cube of the nodes' unit.
 std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, double own_share);
 
-/// Scaled Jacobian from which on a cell indicates its wanted size: it is trusted below.
-inline constexpr double kTrustedJacobian = 0.3;
-
 /// Boxes (`ideal_boxes`) for a mesh in which some cells say nothing about the size that is wanted there.
 ///
 /// A trusted cell keeps its own box. The others get cubes whose size varies smoothly between those and the boundary:

@@ -13,10 +13,6 @@ namespace subvol::internal {
 
 namespace {
 
-/// One in so many of the curves at fault is given up at once: a smaller share takes many more fits, a larger one gives
-/// up curves that are well without the others.
-constexpr std::size_t kOneIn = 3;
-
 void require_sizes(const PatchedMesh& patched, const SignedFeatures& features, std::span<const double> faults,
                    RoutingOptions& options) {
   const std::size_t curves = features.curves.curves.size();
@@ -71,7 +67,8 @@ bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& featu
     any_joined = true;
   }
   if (any_joined) return true;
-  const std::size_t count = curves.empty() ? 0 : std::max<std::size_t>(1, curves.size() / kOneIn);
+  const std::size_t count =
+      curves.empty() ? 0 : std::max<std::size_t>(1, curves.size() / static_cast<std::size_t>(options.one_in));
   for (const auto& [fault, c] : std::span(curves).first(count)) options.excluded[c] = 1;
   return count > 0;
 }

@@ -5,6 +5,7 @@
 #include "subvol/fit/features/curve_parts.h"
 #include "subvol/fit/features/not_followed.h"
 #include "subvol/fit/features/signed_features.h"
+#include "subvol/fit/tuning/automatic_tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstdint>
@@ -39,6 +40,7 @@ struct RoutingOptions {
   /// One entry per curve, not zero for those whose paths run along feature curves of the sheets, which no other path
   /// uses; empty: none. Only with `on_sheets`.
   std::vector<std::uint8_t> along_sheet_curves;
+  int one_in = AutomaticTuning{}.one_in;  ///< `give_up_poor_curves` gives up one in so many of the curves at fault
   /// Asked before each search; if it returns true, no more paths are found. Empty: never.
   std::function<bool()> cancelled;
 };

@@ -12,13 +12,8 @@ namespace subvol::internal {
 
 namespace {
 
-/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell and falls as fast as
-/// the cells recover (the rule of the published code). After a round that gains little, the next epsilon is at most
-/// kLeastFall times the last one.
-constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
-/// Relative decrease of the energy below which a round counts as converged for its epsilon.
-constexpr double kConvergedDecrease = 0.1;
-/// Factor on the weight of cells that are not certified after such a round.
+constexpr double kLeastEpsilon = 1e-4;  // relative to a determinant of 1
+/// Factor on the weight of cells that are not certified after a round that has converged.
 constexpr double kWeightGrowth = 1.5;
 /// A round ends after so many steps, or when two steps in a row decrease the energy by a smaller share than this:
 /// the next epsilon changes it anyway.
@@ -84,9 +79,10 @@ class TangledCells {
 
 UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const UntangleOptions& options,
                         const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report) {
+  const OptimizeTuning& tuning = options.tuning;
   TangledCells cells(problem, num_cells);
   if (cells.look(x)) return {};
-  double epsilon = std::max(kShareOfWorst * std::abs(cells.determinant()), kLeastEpsilon);
+  double epsilon = std::max(tuning.share_of_worst * std::abs(cells.determinant()), kLeastEpsilon);
   std::size_t fewest = cells.uncertified().size();
   double best = cells.determinant();
   int idle = 0;
@@ -103,9 +99,9 @@ UntangleResult untangle(FitProblem& problem, std::size_t num_cells, const Untang
     idle = gained ? 0 : idle + 1;
     fewest = std::min(fewest, cells.uncertified().size());
     best = std::max(best, cells.determinant());
-    double next = kShareOfWorst * std::abs(cells.determinant());
-    if (decrease < kConvergedDecrease) {
-      next = std::min(next, kLeastFall * epsilon);
+    double next = tuning.share_of_worst * std::abs(cells.determinant());
+    if (decrease < tuning.converged_decrease) {
+      next = std::min(next, tuning.least_fall * epsilon);
       cells.raise_weights();
     }
     epsilon = std::max(next, kLeastEpsilon);

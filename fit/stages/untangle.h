@@ -4,6 +4,7 @@
 #include "subvol/fit/solver/fit_problem.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/tuning/optimize_tuning.h"
 
 #include <cstddef>
 #include <vector>
@@ -14,6 +15,7 @@ struct UntangleOptions {
   double tangential_weight = 0;  ///< weight in the problem's surface term, for the report
   int max_rounds = 40;           ///< largest number of solves of a few Newton steps, each with its own epsilon
   int patience = 6;              ///< number of rounds in a row without a gain after which the work ends
+  OptimizeTuning tuning{};       ///< how epsilon falls
 };
 
 struct UntangleResult {
