@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
     mesh.coefficients[i] /= target.normalization.diagonal;
   }
   const BoundarySamples samples = make_boundary_samples(mesh.space, kBoundarySampleIntervals);
-  target.sample(samples.points.size());
+  target.sample(samples.points.size(), static_cast<std::size_t>(FitTuning{}.least_target_samples));
   const auto problem = [&] { return last_stage(mesh, sample.template_mesh, target, samples); };
   const Run newton = timed(minimize_newton, problem(), mesh.coefficients);
   const Run lbfgs = timed(minimize_lbfgs, problem(), mesh.coefficients);

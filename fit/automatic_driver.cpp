@@ -73,11 +73,11 @@ std::function<bool(double)> AutomaticDriver::begin_template() {
   };
 }
 
-QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule schedule) {
+QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule schedule) const {
   // As in the merit of a trial, poor cells cost more than a place that is slightly too far. With the weights of other
   // lifts, y-belt-idler kept a scaled Jacobian of 0.28 rather than a largest distance of 0.58 % for 0.52.
   schedule.merit = {.excess = 1, .poor = 3};
-  schedule.most_distance = kMaxMargin * max_percent / 100;
+  schedule.most_distance = options_.tuning.quality.max_margin * max_percent / 100;
   return schedule;
 }
 
@@ -90,7 +90,7 @@ bool AutomaticDriver::fit_and_refine(int levels) {
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells(), .level = levels};
   bool going = true;
   for (int level = 0; going && level < levels; ++level) {
-    going = fit_level(level, coarse_quality_schedule(options_.quality), "", kCoarsePortion);
+    going = fit_level(level, coarse_quality_schedule(options_.quality, options_.tuning.quality), "", kCoarsePortion);
     if (!going)
       trial.level = level;
     else if (options_.makes_cage && level + 1 == levels)
@@ -99,10 +99,11 @@ bool AutomaticDriver::fit_and_refine(int levels) {
       mesh_ = smooth_refinement(mesh_);
   }
   if (going)
-    going = fit_level(levels,
-                      aiming_at_distance(levels == 0 ? single_quality_schedule(options_.quality)
-                                                     : fine_quality_schedule(options_.quality)),
-                      "");
+    going =
+        fit_level(levels,
+                  aiming_at_distance(levels == 0 ? single_quality_schedule(options_.quality, options_.tuning.quality)
+                                                 : fine_quality_schedule(options_.quality, options_.tuning.quality)),
+                  "");
   if (going || result_.trials.empty()) going = judge(trial) && going;
   return going && relax_last_trial();
 }
@@ -112,8 +113,8 @@ bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
     begin_cage();
     trial.level = 1;
   }
-  const QualitySchedule schedule =
-      cage_ ? fine_quality_schedule(options_.quality) : single_quality_schedule(options_.quality);
+  const QualitySchedule schedule = cage_ ? fine_quality_schedule(options_.quality, options_.tuning.quality)
+                                         : single_quality_schedule(options_.quality, options_.tuning.quality);
   const bool going = fit_level(trial.level, aiming_at_distance(schedule), ", edges", portion);
   return going || result_.trials.empty() ? judge(std::move(trial)) && going : going;
 }
@@ -128,7 +129,7 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
                                  const QualitySchedule& schedule, const char* what,
                                  const std::function<void(QualityStages&)>& prepare) {
   QualityStages stages(mesh_, lengths, cage_ ? cage_->level().nodes : identity_map(mesh_.num_vertices()), {}, boundary,
-                       target_.surface, creases);
+                       target_.surface, creases, options_.tuning.quality);
   if (prepare) prepare(stages);
   if (!std::exchange(has_started_, true))
     result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)))));
@@ -236,7 +237,8 @@ bool AutomaticDriver::polish() {
     const auto poor = std::ranges::count_if(least, [goal](double quality) { return quality < goal; });
     const double most = (cage_ ? tuning.most_poor_of_cage : tuning.most_poor) * static_cast<double>(least.size());
     if (static_cast<double>(poor) > most) break;
-    going = fit_level(trial.level, aiming_at(most_percent, late_quality_schedule(goal)), ", polished");
+    going = fit_level(trial.level, aiming_at(most_percent, late_quality_schedule(goal, options_.tuning.quality)),
+                      ", polished");
     reached = state_.merit >= 1;
     is_lifted = true;
   }

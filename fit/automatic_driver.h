@@ -42,7 +42,9 @@ class AutomaticDriver {
   /// target: any that a `FitTarget` is made from.
   template <class Target>
   AutomaticDriver(const AutomaticFitOptions& options, const Target& target)
-      : options_(checked_options(options)), target_(target), runner_(options.control) {}
+      : options_(checked_options(options)),
+        target_(target),
+        runner_(options.control, SolverKind::newton, options.tuning) {}
   ~AutomaticDriver() = default;
 
   const AutomaticFitTrial& best() const { return result_.trials[result_.chosen]; }
@@ -136,7 +138,7 @@ class AutomaticDriver {
 
  private:
   std::vector<Vec3>& unknowns() { return cage_ ? cage_->cage.positions : mesh_.positions; }
-  static QualitySchedule aiming_at(double max_percent, QualitySchedule schedule);
+  QualitySchedule aiming_at(double max_percent, QualitySchedule schedule) const;
   std::vector<Index> hopeless_cells(bool may_meet) const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 

@@ -128,7 +128,8 @@ bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
   double least_faults = std::numeric_limits<double>::infinity();
   for (int round = 0; round < tuning().most_routings; ++round) {
     if (round > 0) lay_out(routing);
-    if (!fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) return false;
+    if (!fit_level(0, coarse_quality_schedule(options_.quality, options_.tuning.quality), ", edges", kCoarsePortion))
+      return false;
     const std::vector<double> faults = faults_of_cells(true);
     const double sum = std::accumulate(faults.begin(), faults.end(), 0.0);
     if (sum >= least_faults) break;  // what was given up has not helped
@@ -251,7 +252,7 @@ bool AutomaticFit::run_graded() {
     finest_ = make_template({.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells), .pillow = true});
     if (!finest_) return !no_template_.empty();
   }
-  target_.sample(0);
+  target_.sample(0, static_cast<std::size_t>(options_.tuning.fitting.least_target_samples));
   const ClosestPoint fitted(refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh))));
   std::vector<Vec3> places = missed_points(target_.surface, fitted, options_.max_tolerance_percent / 100);
   for (const Fault& fault : faults_of_best())
@@ -272,8 +273,9 @@ bool AutomaticFit::run_graded() {
   sizes_ = graded->sizes;
   start_ = {.sizes = std::move(graded->sizes)};
   AutomaticFitTrial trial{.template_cells = finest_->mesh.num_cells(), .refined_cells = mesh_.num_cells()};
-  return fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality)), ", graded") && judge(trial) &&
-         relax_last_trial();
+  return fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality, options_.tuning.quality)),
+                   ", graded") &&
+         judge(trial) && relax_last_trial();
 }
 
 /// Cuts the cells at which the best trial, which follows no edges, is not as good as aimed at, and fits the result.
@@ -297,7 +299,8 @@ bool AutomaticFit::run_refined() {
   begin_mesh(stages_of_best());
   sizes_ = refined->sizes;
   start_ = {.sizes = std::move(refined->sizes)};
-  return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&
+  return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality, options_.tuning.quality)),
+                   ", refined") &&
          judge(trial) && relax_last_trial();
 }
 

@@ -41,7 +41,7 @@ void AutomaticSolidDriver::find_features() {
   // Larger targets are not sampled more densely. Their features may be missed if they are smaller than the spacing of
   // so many samples, 0.2 % of the root of the area.
   constexpr std::size_t kMostFeatureSamples = 200'000;
-  target_.sample(0, kLeastTargetSamples, kMostFeatureSamples);
+  target_.sample(0, static_cast<std::size_t>(options_.tuning.fitting.least_target_samples), kMostFeatureSamples);
   const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
   features_ = feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2),
                             most, [this] { return runner_.is_to_end(); });
@@ -116,7 +116,7 @@ bool AutomaticSolidDriver::fit_level(int level, const QualitySchedule& schedule,
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
         return level_layout_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
-                                            kQualityTangentialWeight);
+                                            options_.tuning.quality.tangential_weight);
       };
   }
   const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
@@ -234,7 +234,7 @@ bool AutomaticSolidDriver::fit_smoothly(VolumeMesh grid, AutomaticAttempt::Kind 
 
 void AutomaticSolidDriver::lay_out(RoutingOptions routing) {
   routing.cancelled = [this] { return runner_.is_to_end(); };
-  layout_ = edge_layout(start_.grid, start_.fitted, edges_.mesh, edges_.features, routing);
+  layout_ = edge_layout(start_.grid, start_.fitted, edges_.mesh, edges_.features, routing, options_.tuning.quality);
   cage_.reset();
   mesh_ = layout_->tagged_mesh;
   sizes_.clear();

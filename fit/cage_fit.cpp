@@ -46,15 +46,18 @@ class SubdivisionFit : SubdivisionDriver {
 /// the mean distance). A stage is rolled back if it is interrupted, if it leaves more than `pairs` self-intersections
 /// of the boundary, or, without a tolerance, if the total loss of shape is too large.
 bool SubdivisionFit::lower_lambda(std::size_t pairs) {
-  const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
+  const double wanted = options_.tolerance_percent.value_or(options_.tuning.fitting.default_accuracy_percent);
   const double least =
-      options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
+      options_.lambda_close * (options_.tolerance_percent ? options_.tuning.fitting.least_lambda_share
+                                                          : options_.tuning.fitting.least_default_lambda_share);
   const auto distortion = [this] {
     const StageRecord* stage = result_.report.last_kept_stage();
     return !stage || stage->iterations.empty() ? 0 : stage->iterations.back().volume_energy;
   };
   double mean = measured_mean(), volume = distortion();
-  const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
+  const double shape = mean_scaled_jacobian();
+  const double most_loss =
+      options_.cage_only ? options_.tuning.fitting.most_cage_shape_loss : options_.tuning.fitting.most_shape_loss;
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     FitSnapshot stiffer = snapshot();
     if (!run_final_stage(lambda)) {
@@ -71,7 +74,8 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
     mean = measured_mean();
     volume = distortion();
     pairs = *pairs_now;
-    if (gain < (options_.tolerance_percent ? kLeastLambdaHalvingGain : std::max(kLeastLambdaHalvingGain, cost))) break;
+    const double least_gain = options_.tuning.fitting.least_lambda_halving_gain;
+    if (gain < (options_.tolerance_percent ? least_gain : std::max(least_gain, cost))) break;
   }
   return true;
 }
@@ -100,45 +104,41 @@ constexpr std::array<QualityAttempt, 9> kQualityAttempts{{{QualityAttempt::Kind:
                                                           {QualityAttempt::Kind::draw_back, 100, true},
                                                           {QualityAttempt::Kind::draw_back, 1000, true},
                                                           {QualityAttempt::Kind::draw_back, 10000, true}}};
-/// Number of attempts that are made if the mesh may be freed from the cage afterwards.
-constexpr std::size_t kAttemptsBeforeFreeing = 2;
-/// Steps of the lift when the surface is drawn back: the cells have been lifted before.
-constexpr int kLaterLiftSteps = 20;
 
 /// Raises the lowest scaled Jacobians of the finest mesh as far as the distances do not suffer, or rolls back. Returns
 /// false if the fit must end.
 bool SubdivisionFit::raise_quality() {
-  constexpr double kEnoughOfGoal = 0.75;  // a gain to this share of the quality aimed at ends the attempts
-  constexpr double kPoorShare = 0.5;      // the surface is drawn back only if the quality was below this share
+  const QualityTuning& tuning = options_.tuning.quality;
   const StageRecord* last = result_.report.last_kept_stage();
   if (options_.quality == 0 || (last && last->ended == MinimizerStop::infeasible_start)) return true;
   const std::optional<Measured> before = measure();
   if (!before) return false;
   if (before->least_jacobian >= options_.quality) return true;
-  runner_.work().begin_part(1, late_quality_schedule(options_.quality).expected_steps());
+  runner_.work().begin_part(1, late_quality_schedule(options_.quality, tuning).expected_steps());
   FitSnapshot best = snapshot();
   double best_jacobian = before->least_jacobian;
-  const bool is_poor = before->least_jacobian < kPoorShare * options_.quality;
+  const bool is_poor = before->least_jacobian < tuning.poor_share * options_.quality;
   bool is_lifted = false;
-  const auto attempts =
-      std::span(kQualityAttempts).first(options_.frees_mesh ? kAttemptsBeforeFreeing : kQualityAttempts.size());
+  const std::size_t most =
+      options_.frees_mesh ? static_cast<std::size_t>(tuning.attempts_before_freeing) : kQualityAttempts.size();
+  const auto attempts = std::span(kQualityAttempts).first(std::min(most, kQualityAttempts.size()));
   for (const QualityAttempt& attempt : attempts) {
     const bool has_gained = best_jacobian > before->least_jacobian;
     const bool is_lift = attempt.kind == QualityAttempt::Kind::lift;
-    if (has_gained && (is_lift || best_jacobian >= kEnoughOfGoal * options_.quality)) break;
+    if (has_gained && (is_lift || best_jacobian >= tuning.enough_of_goal * options_.quality)) break;
     if (!is_lift && !(is_poor && is_lifted)) continue;
     if (is_lift) go_back(best);
     QualitySchedule schedule =
-        is_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
-    schedule.most_distance = (is_lift ? 1 : kMaxMargin) * before->largest();
+        is_lift ? late_quality_schedule(options_.quality, tuning) : fine_quality_schedule(options_.quality, tuning);
+    schedule.most_distance = (is_lift ? 1 : tuning.max_margin) * before->largest();
     schedule.give_surface_more_weight(attempt.surface);
     schedule.lifts_worst_of_cage = attempt.worst_patches;
-    if (!is_lift) schedule.lift.steps = std::min(schedule.lift.steps, kLaterLiftSteps);
+    if (!is_lift) schedule.lift.steps = std::min(schedule.lift.steps, tuning.later_lift_steps);
     const bool going = or_back(best, [&] { return run_quality_stages(schedule); });
     std::optional<Measured> now = going ? measure() : std::nullopt;
     if (!now) {
       if (result_.report.stop_reason == StopReason::time_limit) now = measure(true);
-      const bool gains = now && now->gains_on(*before, options_.tolerance_percent);
+      const bool gains = now && now->gains_on(*before, options_.tolerance_percent, tuning);
       if (!gains || now->least_jacobian <= best_jacobian) go_back(std::move(best));
       return false;
     }
@@ -148,7 +148,7 @@ bool SubdivisionFit::raise_quality() {
       lifted_mesh_ = current_mesh();
       lifted_mesh_.positions = target_.normalization.from_unit(std::move(lifted_mesh_.positions));
     }
-    if (!now->gains_on(*before, options_.tolerance_percent)) continue;
+    if (!now->gains_on(*before, options_.tolerance_percent, tuning)) continue;
     if (now->least_jacobian <= best_jacobian) break;  // more weight of the surface would not help
     best_jacobian = now->least_jacobian;
     best = snapshot();
@@ -193,8 +193,12 @@ bool SubdivisionFit::improve_finest(const FitSnapshot& start) {
   std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return false;
   const std::array<std::function<bool()>, 5> steps{
-      [&] { return unfold(start, kMostUnfoldingLambda, *pairs); }, [&] { return lower_lambda(*pairs); },
-      [&] { return fit_all_samples(); }, [&] { return raise_quality(); }, [&] { return flatten_interfaces(); }};
+      [&] {
+        return unfold(start, options_.tuning.fitting.unfolding_factor, options_.tuning.fitting.most_unfolding_lambda,
+                      *pairs);
+      },
+      [&] { return lower_lambda(*pairs); }, [&] { return fit_all_samples(); }, [&] { return raise_quality(); },
+      [&] { return flatten_interfaces(); }};
   for (const std::function<bool()>& step : steps) {
     FitSnapshot before = snapshot();
     try {

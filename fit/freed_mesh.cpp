@@ -27,18 +27,9 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kLayerBelow = 0.75;  // share of the quality below which a layer of cells is attempted
-constexpr double kMostRise = 1.05;    // largest factor on the distances from the target
-/// Share of the distances of the cage's mesh that is the tolerance of a second optimization, if the first result is
-/// farther off than that mesh may be.
-constexpr double kNearerShare = 0.7;
-
 /// Largest distance from the target, in percent of its diagonal, at which a mesh is freed: one farther off is not in
 /// place.
 constexpr double kMostFreedPercent = 50;
-/// Mean distance, in sizes of a boundary face, at which a freed mesh counts as the finest level that its cage could not
-/// reach. Balls and tori of 50 to 4,000 cells have 0.02 to 0.08.
-constexpr double kReachedShare = 0.1;
 
 /// Frees the mesh of one fit: makes the attempts, and puts the best mesh in the place of the fit's.
 class MeshFreeing {
@@ -47,7 +38,7 @@ class MeshFreeing {
       : target_(target),
         options_(options),
         result_(result),
-        runner_(options.control),
+        runner_(options.control, SolverKind::newton, options.tuning),
         start_(measure_state(result.mesh, target)) {
     best_ = start_;
   }
@@ -75,7 +66,7 @@ class MeshFreeing {
 bool MeshFreeing::is_too_far(const MeshState& now) const {
   const std::optional<double>& tolerance = options_.tolerance_percent;
   return (tolerance && now.mean_percent > *tolerance && now.mean_percent > start_.mean_percent) ||
-         now.is_farther_than(start_);
+         now.is_farther_than(start_, options_.tuning.quality.most_rise);
 }
 
 /// Returns true if a state is better than the best one: validity counts first, then the least scaled Jacobian.
@@ -89,8 +80,10 @@ bool MeshFreeing::attempt(VolumeMesh mesh, double begin, double end) {
   const double middle = (begin + end) / 2;
   const std::size_t first = result_.report.stages.size();
   const MeshState before = best_;
-  std::optional<MeshState> now = optimize(mesh, kMostRise, part_of_work(options_.control, begin, middle));
-  if (now && is_too_far(*now)) now = optimize(mesh, kNearerShare, part_of_work(options_.control, middle, end));
+  std::optional<MeshState> now =
+      optimize(mesh, options_.tuning.quality.most_rise, part_of_work(options_.control, begin, middle));
+  if (now && is_too_far(*now))
+    now = optimize(mesh, options_.tuning.quality.nearer_share, part_of_work(options_.control, middle, end));
   if (best_ == before) result_.report.undo_stages(first, result_.report.stages.size());
   return now.has_value();
 }
@@ -107,7 +100,8 @@ std::optional<MeshState> MeshFreeing::optimize(VolumeMesh& mesh, double distance
   OptimizeOptions options{.quality = options_.quality,
                           .mean_tolerance_percent = tolerance(start_.mean_percent),
                           .max_tolerance_percent = tolerance(start_.max_percent),
-                          .control = std::move(control)};
+                          .control = std::move(control),
+                          .tuning = options_.tuning};
   // As in the fit: without an angle, only the template's own creases are sharp.
   const double usual_angle = mesh.tags.creases.empty() ? kNoCreaseAngle : kUsualCreaseAngle;
   options.crease_angle_degrees = options_.crease_angle_degrees.value_or(usual_angle);
@@ -139,7 +133,7 @@ std::optional<MeshState> MeshFreeing::optimize(VolumeMesh& mesh, double distance
 bool MeshFreeing::reaches_the_finest_level() const {
   return options_.control.max_iterations == 0 && result_.report.stop_reason == StopReason::stalled &&
          result_.level == options_.levels && best_.is_valid() &&
-         best_.mean_percent <= kReachedShare * best_.face_percent;
+         best_.mean_percent <= options_.tuning.quality.reached_share * best_.face_percent;
 }
 
 /// Makes the best mesh the result, if it is not the cage's.
@@ -169,7 +163,7 @@ void MeshFreeing::try_to_free(const VolumeMesh& lifted) {
   const VolumeMesh& start = is_lifted ? lifted : result_.mesh;
   try {
     if (!attempt(start, 0, kFirstFreeingWorkShare)) return;
-    if (best_.is_valid() && best_.least_jacobian >= kLayerBelow * options_.quality) return;
+    if (best_.is_valid() && best_.least_jacobian >= options_.tuning.quality.layer_below * options_.quality) return;
     attempt(pillow(freed_ ? *freed_ : start, {}, InvertedCells::allowed), kFirstFreeingWorkShare, 1);
   } catch (const std::bad_alloc&) {
     result_.report.stop_reason = StopReason::memory_limit;
@@ -186,8 +180,8 @@ void MeshFreeing::run(const VolumeMesh& lifted) {
 
 }  // namespace
 
-bool MeshState::is_farther_than(const MeshState& other) const {
-  return mean_percent > kMostRise * other.mean_percent || max_percent > kMostRise * other.max_percent;
+bool MeshState::is_farther_than(const MeshState& other, double most_rise) const {
+  return mean_percent > most_rise * other.mean_percent || max_percent > most_rise * other.max_percent;
 }
 
 MeshState measure_state(const VolumeMesh& mesh, const TriangleMesh& target) {

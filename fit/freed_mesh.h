@@ -22,7 +22,7 @@ struct MeshState {
 
   bool is_valid() const { return uncertified == 0 && pairs == 0; }
   /// Returns true if one of the distances is more than 5 % larger than that of another state.
-  bool is_farther_than(const MeshState& other) const;
+  bool is_farther_than(const MeshState& other, double most_rise) const;
   bool operator==(const MeshState&) const = default;
 };
 MeshState measure_state(const VolumeMesh& mesh, const TriangleMesh& target);

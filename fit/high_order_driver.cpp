@@ -30,11 +30,6 @@ namespace subvol::internal {
 
 namespace {
 
-/// Share of the target's sharp edges, by length, that creases must follow for the lower of the two usual lambdas: soft
-/// cells are pressed flat where the surface is drawn into an edge that they do not follow. Of a wedge of 15 degrees
-/// whose tip is not followed, they kept a least scaled Jacobian of 0.02 instead of 0.73.
-constexpr double kNearlyAllEdges = 0.98;
-
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
     require_in_range("HighOrderFitOptions", name, value, low, high);
@@ -64,7 +59,7 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
       template_(checked_template(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
-      runner_(options.control, options.solver) {
+      runner_(options.control, options.solver, options.tuning) {
   target_.normalization.take_in(template_);
   mesh_.coefficients = template_.positions;
   creases_ = creases_along_target(target_, crease_rule(), template_);
@@ -74,9 +69,10 @@ void HighOrderDriver::look_over_template() {
   const StartComparison start = target_.compare_start(
       order_ > 1 ? measured_boundary() : refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report_.note_start(start);
-  const double usual_lambda = creases_.followed_share() >= kNearlyAllEdges ? kCurvingLambda : kLambdaOfOrders;
+  const bool follows_nearly_all = creases_.followed_share() >= tuning().nearly_all_edges;
+  const double usual_lambda = follows_nearly_all ? kCurvingLambda : kLambdaOfOrders;
   schedule_ = make_high_order_schedule(options_.lambda_close.value_or(usual_lambda),
-                                       start.mean_distance / target_.surface.length());
+                                       start.mean_distance / target_.surface.length(), options_.tuning);
   keep_interfaces(crease_rule(), target_, creases_, template_, report_);
   if (target_.has_interfaces()) group_of_face_ = groups_of_sheets(template_, mesh_.space.topology());
 }
@@ -84,14 +80,12 @@ void HighOrderDriver::look_over_template() {
 /// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
 /// chord errors to be negligible; fewer on surfaces of many faces, where chord errors matter less.
 int HighOrderDriver::sample_intervals(int order) const {
-  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;  // along an edge of a face
-  // Number of triangles of all faces beyond which edges get no more intervals than they need.
-  constexpr double kMostFittedTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const double triangles = 2 * static_cast<double>(target_.surface.num_details());
-  const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
-  const int affordable = static_cast<int>(std::sqrt(kMostFittedTriangles / (2 * faces)));
-  return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
+  const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), tuning().most_intervals);
+  const int affordable = static_cast<int>(std::sqrt(tuning().most_fitted_triangles / (2 * faces)));
+  return std::max({of_target, tuning().least_intervals_per_order * order,
+                   std::min(tuning().wanted_intervals_per_order * order, affordable)});
 }
 
 /// Returns the number of intervals for measuring: more than for the fit, up to about twice as many, if there are not
@@ -123,7 +117,7 @@ void HighOrderDriver::set_orders(const EntityOrders& orders) {
   mesh_ = mesh_.with_orders(orders);
   order_ = mesh_.space.max_order();
   samples_ = sheet_samples(mesh_.space);
-  target_.sample(samples_.points.size());
+  target_.sample(samples_.points.size(), static_cast<std::size_t>(options_.tuning.fitting.least_target_samples));
   mean_.reset();
 }
 
@@ -147,9 +141,10 @@ std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpa
     boxes[i] = ideal_boxes_[c];
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
+  volume->set_tuning(options_.tuning.curved);
   volume->count_as_part(template_.num_cells());
   volume->set_distortion(options_.distortion);
-  volume->set_hinge(hinge_, std::min(1.0, options_.quality + kHingeAboveQuality));
+  volume->set_hinge(hinge_, std::min(1.0, options_.quality + tuning().hinge_above_quality));
   return volume;
 }
 
@@ -216,13 +211,13 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
 
 /// The patch is a part of the problem of `run_stage`, with the same weights.
 bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
-  constexpr std::size_t kMostMovedAsWhole = 3000;  // moving all of so many cells takes seconds, and helps more
-  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));
+  const auto cells_of_template = static_cast<double>(template_.num_cells());
+  const auto most = static_cast<std::size_t>(options_.tuning.quality.most_patch_share * cells_of_template);
   std::optional<HighOrderPatch> patch;
   if (options_.correspondence == Correspondence::closest)
     for (std::size_t count = cells.size(); count > 0 && !patch; count /= 2) {
       patch = high_order_patch(template_, mesh_.space, cells.first(count), kHighOrderRings, most);
-      if (template_.num_cells() <= kMostMovedAsWhole) break;
+      if (template_.num_cells() <= static_cast<std::size_t>(tuning().most_moved_as_whole)) break;
     }
   if (!patch) return run_stage(stage);
   if (!runner_.in_time(formatted("order %d", order_), report_)) return false;

@@ -32,6 +32,7 @@ namespace subvol::internal {
 /// and `measured_interfaces`.
 class HighOrderDriver : protected StagedFit {
  protected:
+  const CurvedTuning& tuning() const { return options_.tuning.curved; }
   /// The measures of a state when shape is weighed against distance.
   struct Outcome {
     std::vector<double> cell_minima{};  ///< least scaled Jacobian of each cell

@@ -28,26 +28,15 @@ using namespace internal;
 
 namespace {
 
-/// p-adaptivity: share of the total possible gain that one raise aims at, and the least gain, relative to E_S, that
-/// justifies a raise.
-constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// A place is far if its distance exceeds kFarShare times the mean and kNearPercent of the diagonal, a tenth of the
-/// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At
-/// first, a place at kFirstFarLength times the mean counts twice.
-constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
-/// Mean distances below this, in percent of the diagonal, and largest ones below kNearPercent count alike: a quarter
-/// of the mean that automatic fits aim at.
+/// At first, a place at so many times the mean distance counts twice.
+constexpr double kFirstFarLength = 8;
+/// Mean distances below this, in percent of the diagonal, and largest ones below `CurvedTuning::near_percent` count
+/// alike: a quarter of the mean that automatic fits aim at.
 constexpr double kNearMeanPercent = 0.005;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
-constexpr int kMostDraws = 4, kDrawSteps = 20;  // draws toward the target in a round, and the steps of each
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
 constexpr double kFairScaledJacobian = 0.5;
-/// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
-constexpr int kMostImprovements = 3;
-constexpr double kMostDistanceGrowth = 1.2;
-/// Largest distance that may be caused in any case, in percent of the diagonal: what automatic fits aim at.
-constexpr double kAllowedMaxPercent = 0.5;
 
 /// The high-order fit: its sequence of orders, and the improvement of the worst places.
 class HighOrderFit : HighOrderDriver {
@@ -175,7 +164,9 @@ bool HighOrderFit::run_first_orders(int last) {
     Arrival next = arrival(*folded, stages_begin);
     const bool better = !best || std::tuple(next.folded, next.energy) < std::tuple(best->folded, best->energy);
     if (better) best = std::move(next);
-    const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
+    // Cells that are distorted and still far from the target: their resolution is not the cause.
+    const bool fair = last < kTellingOrder || best->mean <= tuning().fair_distance_percent ||
+                      best->distortion <= tuning().fair_distortion;
     if (!best->folded && fair) break;
   }
   return_to(*std::move(best), last, stages_before);
@@ -201,8 +192,8 @@ bool HighOrderFit::raise_where_it_pays() {
       problem(raised.space, volume_energy(raised.space), samples, schedule_.final_stage(lambda_));
   const EntityValues gains = order_gains(raised_problem, raised.space, mesh_.space.orders(), raised.coefficients);
   const double surface = raised_problem.surface->target_to_surface() + raised_problem.surface->surface_to_target();
-  if (!(gains.sum() > kLeastOrderGain * surface)) return false;
-  set_orders(raised_where_it_pays(mesh_.space, next, gains, kRaisedShare));
+  if (!(gains.sum() > tuning().least_order_gain * surface)) return false;
+  set_orders(raised_where_it_pays(mesh_.space, next, gains, tuning().raised_share));
   return true;
 }
 
@@ -238,7 +229,7 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
       return pairs_now.has_value();
     }
     pairs = *pairs_now;
-    if (1 - measured_mean() / before < kLeastLambdaHalvingGain) break;
+    if (1 - measured_mean() / before < options_.tuning.fitting.least_lambda_halving_gain) break;
   }
   return true;
 }
@@ -252,7 +243,8 @@ bool HighOrderFit::finish() {
   if (!pairs || *pairs == 0) return pairs.has_value();
   const std::size_t pairs_before = *pairs;
   emphasis_ = hinge_ = far_length_ = 0;
-  if (!unfold(starts_.back(), kMostUnfoldingLambdaOfOrders, *pairs)) return false;
+  if (!unfold(starts_.back(), options_.tuning.fitting.unfolding_factor, tuning().most_unfolding_lambda, *pairs))
+    return false;
   return *pairs == pairs_before || (lower_lambda(*pairs) && improve_worst_places());
 }
 
@@ -285,10 +277,11 @@ bool HighOrderFit::improve_worst_places() {
   const std::optional<Outcome> first = measured_outcome(false);
   if (!first) return false;
   outcome_ = *first;
-  most_max_ = std::max(kMostDistanceGrowth * outcome_.max_percent, kAllowedMaxPercent);
-  most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
-                                          : std::max(kMostDistanceGrowth * outcome_.mean_percent, kNearMeanPercent);
-  for (int round = 0; round < kMostImprovements; ++round) {
+  most_max_ = std::max(tuning().most_distance_growth * outcome_.max_percent, tuning().allowed_max_percent);
+  most_mean_ = options_.tolerance_percent
+                   ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
+                   : std::max(tuning().most_distance_growth * outcome_.mean_percent, kNearMeanPercent);
+  for (int round = 0; round < tuning().most_improvements; ++round) {
     const double far_length_before = far_length_;
     if (draw_in_far_places() == Again::ended) return false;
     if (round > 0 && far_length_ == far_length_before) break;  // the same lifts would fail again
@@ -305,8 +298,8 @@ bool HighOrderFit::improve_worst_places() {
 bool HighOrderFit::is_better(const Outcome& next) const {
   const double good = std::max(kFairScaledJacobian, options_.quality);
   const auto shape = [&](const Outcome& x) { return std::min(x.least_scaled_jacobian, good); };
-  const auto distances = [](const Outcome& x) {
-    return std::max(x.mean_percent, kNearMeanPercent) * std::max(x.max_percent, kNearPercent);
+  const auto distances = [this](const Outcome& x) {
+    return std::max(x.mean_percent, kNearMeanPercent) * std::max(x.max_percent, tuning().near_percent);
   };
   const double gain = distances(outcome_) / distances(next);
   return shape(next) > 0 && gain * shape(next) > shape(outcome_) && next.mean_percent <= most_mean_ &&
@@ -336,11 +329,12 @@ Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, dou
 Again HighOrderFit::draw_in_far_places() {
   Again last = Again::kept;
   if (options_.correspondence != Correspondence::closest) return last;
-  for (int draw = 0; draw < kMostDraws && last == Again::kept; ++draw) {
-    const double far = std::max(kFarShare * outcome_.mean_percent, kNearPercent);
+  for (int draw = 0; draw < tuning().most_draws && last == Again::kept; ++draw) {
+    const double far = std::max(tuning().far_share * outcome_.mean_percent, tuning().near_percent);
     if (!(outcome_.max_percent > far)) break;
     const double first = kFirstFarLength * outcome_.mean_percent / 100;
-    last = run_again(far_cells(kStartOfFar * far), far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
+    last = run_again(far_cells(kStartOfFar * far), far_length_, far_length_ == 0 ? first : far_length_ / 2,
+                     tuning().draw_steps);
   }
   return last;
 }
@@ -350,8 +344,8 @@ Again HighOrderFit::lift_by(double& setting, const LiftValues& values) {
   const auto is_poor = [&] {
     return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < options_.quality;
   };
-  return lift(setting, values, is_poor, [&](double value) {
-    return run_again(poor_cells(outcome_.cell_minima, options_.quality), setting, value, kLiftSteps);
+  return lift(setting, values, tuning().most_failed_lifts, is_poor, [&](double value) {
+    return run_again(poor_cells(outcome_.cell_minima, options_.quality), setting, value, tuning().lift_steps);
   });
 }
 

@@ -123,7 +123,7 @@ CurvedOptimizer::CurvedOptimizer(const HighOrderMesh& mesh, const VolumeMesh& la
       mesh_(box_.to_unit(mesh)),
       labels_(labels),
       projectors_(sheet_projectors(mesh_, labels, options.fixed_boundary)),
-      runner_(options.control) {}
+      runner_(options.control, SolverKind::newton, options.tuning) {}
 
 /// Sizes of cells that are inverted or poor say nothing; the sizes around them do.
 void CurvedOptimizer::find_sizes() {
@@ -146,8 +146,9 @@ std::unique_ptr<HighOrderEnergy> CurvedOptimizer::volume_energy(const ElementSpa
     boxes.push_back(ideal_boxes_[cells[i]]);
   }
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
+  volume->set_tuning(options_.tuning.curved);
   volume->count_as_part(mesh_.space.num_cells());
-  volume->set_hinge(hinge_, std::min(1.0, options_.quality + kHingeAboveQuality));
+  volume->set_hinge(hinge_, std::min(1.0, options_.quality + options_.tuning.curved.hinge_above_quality));
   return volume;
 }
 
@@ -187,7 +188,8 @@ CurvedOptimizer::Part CurvedOptimizer::whole() const {
 
 /// A large mesh moves only around the first of the cells, as many as keep the part small.
 CurvedOptimizer::Part CurvedOptimizer::around(std::span<const Index> cells) const {
-  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_.space.num_cells()));
+  const auto most =
+      static_cast<std::size_t>(options_.tuning.quality.most_patch_share * static_cast<double>(mesh_.space.num_cells()));
   for (std::size_t count = cells.size(); count > 0; count /= 2)
     if (auto patch = high_order_patch(labels_, mesh_.space, cells.first(count), kHighOrderRings, most))
       return make_part(patch->space, patch->cells, patch->nodes, patch->unknowns);
@@ -240,12 +242,12 @@ bool CurvedOptimizer::untangle_cells() {
 /// Jacobian rises.
 Again CurvedOptimizer::lift_by(const char* name, double& setting, const LiftValues& values) {
   const auto is_poor = [&] { return quality_.min_scaled_jacobian < options_.quality; };
-  return lift(setting, values, is_poor, [&](double value) {
+  return lift(setting, values, options_.tuning.curved.most_failed_lifts, is_poor, [&](double value) {
     const std::vector<Index> poor = poor_cells(quality_.cell_minima, options_.quality);
     std::vector<Vec3> before = mesh_.coefficients;
     const double setting_before = std::exchange(setting, value);
     const std::size_t stages_before = report_.stages.size();
-    const bool going = run_stage(formatted("%s %g", name, value), around(poor), kLiftSteps);
+    const bool going = run_stage(formatted("%s %g", name, value), around(poor), options_.tuning.curved.lift_steps);
     QualityReport now = measure();
     if (now.min_scaled_jacobian > quality_.min_scaled_jacobian &&
         now.certificate.not_certified.size() <= quality_.certificate.not_certified.size()) {

@@ -54,7 +54,7 @@ OptimizeDriver::OptimizeDriver(const VolumeMesh& mesh, const TriangleMesh* targe
       own_boundary_(!target),
       target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
       relief_(mesh.num_cells(), 1),
-      runner_(options.control) {
+      runner_(options.control, SolverKind::newton, options.tuning) {
   target_.normalization.take_in(mesh_);
   target_.keep_interfaces(mesh_);
   interfaces_ = find_interfaces(mesh_, topology_);
@@ -85,7 +85,8 @@ void OptimizeDriver::find_features() {
       mesh_, options_.crease_angle_degrees,
       own_boundary_ ? FollowedCreases::InnerCurves::themselves_with_rims : FollowedCreases::InnerCurves::themselves);
   sample_boundary();
-  target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
+  target_.sample(samples_.points.size(),
+                 own_boundary_ ? 1 : static_cast<std::size_t>(options_.tuning.fitting.least_target_samples));
 }
 
 void OptimizeDriver::sample_boundary() {
@@ -281,10 +282,12 @@ bool OptimizeDriver::run_quality_stages(const QualitySchedule& schedule) {
     boundary.group_of_triangle = target_.group_of_triangle;
     if (!creases_.curves().empty())
       creases = [&](double width) {
-        return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
+        return creases_.energy(samples_.crease_edges, samples_.points.size(), width,
+                               options_.tuning.quality.tangential_weight);
       };
   }
-  QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, creases);
+  QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, creases,
+                       options_.tuning.quality);
   std::vector<Vec3> x = std::move(free.unknowns);
   const bool going = stages.run(schedule, runner_, record("quality"), x, report_);
   mesh_.positions = std::move(free.fixed);

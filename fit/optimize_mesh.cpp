@@ -226,7 +226,7 @@ bool MeshOptimizer::raise_quality(double goal) {
   const Measured before = measure();
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
-  QualitySchedule schedule = fine_quality_schedule(goal);
+  QualitySchedule schedule = fine_quality_schedule(goal, options_.tuning.quality);
   runner_.work().begin_portion(kFirstQualityPortion, 1, schedule.expected_steps());
   schedule.most_distance =
       std::max(tuning().max_share_of_tolerance * options_.max_tolerance_percent, before.max_percent) / 100;

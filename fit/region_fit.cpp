@@ -238,7 +238,8 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
         const FollowedCreases& followed = cage_ ? level_creases_ : layout_->creases;
-        return followed.energy(samples.crease_edges, samples.positions.num_rows(), width, kQualityTangentialWeight);
+        return followed.energy(samples.crease_edges, samples.positions.num_rows(), width,
+                               options_.tuning.quality.tangential_weight);
       };
   } else {
     group_by_pairs(boundary, topology);
@@ -367,7 +368,8 @@ bool RegionFit::run_curves(std::size_t cells) {
       continue;
     }
     AutomaticFitTrial trial{.template_cells = grid->num_cells(), .pads = layout_->pads.value_or(0)};
-    if (options_.makes_cage && !fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) {
+    if (options_.makes_cage &&
+        !fit_level(0, coarse_quality_schedule(options_.quality, options_.tuning.quality), ", edges", kCoarsePortion)) {
       if (result_.trials.empty()) judge(std::move(trial));
       return false;
     }

@@ -54,7 +54,7 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
       template_(template_mesh),
       levels_before_(levels_before),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
-      runner_(options.control, options.solver) {
+      runner_(options.control, options.solver, options.tuning) {
   require_valid(template_mesh, "template mesh");
   require_no_pyramids(template_.kinds,
                       "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
@@ -88,19 +88,20 @@ void SubdivisionDriver::prepare_level() {
 /// Samples the target as densely as the level can follow it: more correspondences cost time and change nothing. On the
 /// finest level, a target that has far more detail counts fully in the end only (`fit_all_samples`).
 void SubdivisionDriver::sample_target() {
-  constexpr std::size_t kPerQuad = 6, kLeastCoarse = 3000;  // target samples of a level below the finest
-  constexpr std::size_t kMostPerSample = 4;                 // target samples for each sample of the fitted surface
-  constexpr std::size_t kFarTooMany = 8;                    // the same, from which on the finest level is thinned
+  const FitTuning& tuning = options_.tuning.fitting;
   const std::size_t samples = level_.samples.num_rows();
+  const auto count = [](int number) { return static_cast<std::size_t>(number); };
+  const std::size_t most = count(tuning.most_per_sample) * samples, many = count(tuning.least_target_samples);
   samples_all_ = true;
   if (finest()) {
-    target_.sample(samples);
-    if (target_.surface.samples().size() <= kFarTooMany * samples) return;
+    target_.sample(samples, many);
+    if (target_.surface.samples().size() <= count(tuning.far_too_many_per_sample) * samples) return;
     samples_all_ = target_.surface.is_cloud();
-    target_.surface.thin(kMostPerSample * samples);
+    target_.surface.thin(most);
   } else {
     const std::size_t quads = MeshTopology(level_.mesh).boundary_faces().size();
-    target_.sample(samples, std::clamp(kPerQuad * quads, kLeastCoarse, kLeastTargetSamples), kMostPerSample * samples);
+    const std::size_t few = std::min(count(tuning.least_coarse_samples), many);
+    target_.sample(samples, std::clamp(count(tuning.samples_per_quad) * quads, few, many), most);
   }
 }
 
@@ -112,7 +113,7 @@ bool SubdivisionDriver::fit_all_samples() {
   const std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return false;
   FitSnapshot start = snapshot();
-  target_.sample(level_.samples.num_rows());
+  target_.sample(level_.samples.num_rows(), static_cast<std::size_t>(options_.tuning.fitting.least_target_samples));
   samples_all_ = true;
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = kAllSamplesSteps;
@@ -158,9 +159,6 @@ bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
 ///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionDriver::start_level() {
   constexpr int kMostContinuationRounds = 60;  // to bound the time
-  // Factor on the gain of t until it is feasible, the least gain that counts, and the share of the rest below which the
-  // gain is slow: then lambda rises.
-  constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
   const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
   std::vector<Vec3> safe, wanted;  // the nodes at t = 0 and t = 1
@@ -177,11 +175,11 @@ bool SubdivisionDriver::start_level() {
     wanted = nodes.apply(unknowns_);
     double next = 1;
     while (next > t && !feasible(next)) {
-      next = t + kBackOff * (next - t);
-      if (next - t <= kLeastProgress) next = t;
+      next = t + options_.tuning.fitting.back_off * (next - t);
+      if (next - t <= options_.tuning.fitting.least_progress) next = t;
     }
     // Cells that block the way need better shapes before they can follow.
-    const bool slow = next - t < kSlowShare * (1 - t);
+    const bool slow = next - t < options_.tuning.fitting.slow_share * (1 - t);
     if (next > t)
       t = next;
     else if (stage.lambda >= options_.lambda_far)
@@ -255,12 +253,8 @@ double SubdivisionDriver::Measured::largest() const {
   return largest;
 }
 
-bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
-  // Distances may rise by 5 %, but not past the tolerance; those of the surface that is nearer by a quarter. It gives
-  // way first, because the stages before put it as near as they could. If no mean rises, largest distances may rise by
-  // 10 %: so joint129 at level 2 rises from 0.08 to 0.62 while its mean distance falls by 2 % and its largest one, at a
-  // single place, rises by 7 %.
-  constexpr double kMostDistanceFactor = 1.05, kMostNearerDistanceFactor = 1.25, kMostFarthestPlaceFactor = 1.1;
+bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional<double> tolerance_percent,
+                                           const QualityTuning& tuning) const {
   double farthest_mean_before = 0, farthest_max_before = 0;
   bool no_mean_rises = true;
   for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -268,15 +262,15 @@ bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional
     farthest_max_before = std::max(farthest_max_before, before.distances[i].max());
     no_mean_rises = no_mean_rises && distances[i].mean() <= before.distances[i].mean();
   }
-  const auto most = [](double distance, double farthest, double factor) {
-    return std::max(factor * distance, std::min(kMostNearerDistanceFactor * distance, farthest));
+  const auto most = [&](double distance, double farthest, double factor) {
+    return std::max(factor * distance, std::min(tuning.most_nearer_distance_factor * distance, farthest));
   };
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
     const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
-    if (misses || mean > most(mean_before, farthest_mean_before, kMostDistanceFactor) ||
+    if (misses || mean > most(mean_before, farthest_mean_before, tuning.most_distance_factor) ||
         distances[i].max() > most(before.distances[i].max(), farthest_max_before,
-                                  no_mean_rises ? kMostFarthestPlaceFactor : kMostDistanceFactor))
+                                  no_mean_rises ? tuning.most_farthest_place_factor : tuning.most_distance_factor))
       return false;
   }
   return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;
@@ -295,7 +289,8 @@ std::optional<SubdivisionDriver::Measured> SubdivisionDriver::measure(bool past_
 
 bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
   const auto creases = [&](double width) {
-    return creases_.energy(level_.crease_edges, level_.samples.num_rows(), width, kQualityTangentialWeight);
+    return creases_.energy(level_.crease_edges, level_.samples.num_rows(), width,
+                           options_.tuning.quality.tangential_weight);
   };
   const bool has_creases = !creases_.curves().empty();
   QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
@@ -306,7 +301,8 @@ bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
                         level_.interfaces,
                         level_.face_groups,
                         target_.group_of_triangle},
-                       target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+                       target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr,
+                       options_.tuning.quality);
   stages.before_stage = [this] { keep_state(); };
   StageRecord record;
   record.name = formatted("level %d, quality", level());

@@ -43,7 +43,7 @@ class SubdivisionDriver : protected StagedFit {
 
     double largest() const;
     /// Returns true if the quality has risen, and nothing else has suffered.
-    bool gains_on(const Measured& before, std::optional<double> tolerance_percent) const;
+    bool gains_on(const Measured& before, std::optional<double> tolerance_percent, const QualityTuning& tuning) const;
   };
 
   /// InputError: options out of range; the template has defects.

@@ -101,7 +101,7 @@ bool FreedFit::can_go_on(const FitResult& result) const {
 bool FreedFit::is_kept(const FitResult& next, const FitResult& result) const {
   if (next.mesh.num_cells() <= result.mesh.num_cells()) return false;
   const MeshState now = measure_state(next.mesh, target_), before = measure_state(result.mesh, target_);
-  if (!now.is_valid() || now.is_farther_than(before)) return false;
+  if (!now.is_valid() || now.is_farther_than(before, options_.tuning.quality.most_rise)) return false;
   const StopReason reason = next.report.stop_reason;
   const bool is_done = reason != StopReason::stalled && !ended_early(reason);
   return is_done || now.least_jacobian >= before.least_jacobian;

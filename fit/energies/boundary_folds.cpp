@@ -16,7 +16,7 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kFullTurn = 360, kLeastLimit = 300;  // degrees
+constexpr double kFullTurn = 360;  // degrees
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kLeastArm = 1e-12;  // of vectors that are divided by, in the unit of the nodes
 
@@ -54,7 +54,7 @@ struct Arm {
 
 }  // namespace
 
-BoundaryFolds::BoundaryFolds(const VolumeMesh& mesh) {
+BoundaryFolds::BoundaryFolds(const VolumeMesh& mesh, double least_limit) : least_limit_(least_limit) {
   const MeshTopology topology(mesh);
   struct At {
     Wedge wedge;
@@ -80,12 +80,13 @@ BoundaryFolds::BoundaryFolds(const VolumeMesh& mesh) {
     std::ranges::stable_sort(wedges, {}, [](const At& w) { return (w.is_last ? 2 : 0) - (w.is_first ? 1 : 0); });
     for (const At& w : wedges) wedges_.push_back(w.wedge);
     offsets_.push_back(wedges_.size());
-    limits_.push_back(kLeastLimit);
+    limits_.push_back(least_limit_);
   }
   sort_by_first_cell();
 }
 
-BoundaryFolds::BoundaryFolds(const BoundaryFolds& whole, std::span<const Index> cells) {
+BoundaryFolds::BoundaryFolds(const BoundaryFolds& whole, std::span<const Index> cells)
+    : least_limit_(whole.least_limit_) {
   const auto first_cell = [&](Index e) { return whole.wedges(e).front().cell; };
   const std::vector<Index>& all = whole.by_first_cell_;
   std::vector<Index> near;
@@ -121,7 +122,7 @@ void BoundaryFolds::want(std::span<const EdgeCap> edges, const VolumeMesh& mesh)
     const auto cell = mesh.cell(first.cell);
     const std::array<Index, 2> ends{cell[first.a], cell[first.b]};
     const auto at = std::ranges::lower_bound(edges, ends, {}, &EdgeCap::ends);
-    if (at != edges.end() && at->ends == ends) limits_[e] = std::max(kLeastLimit, (at->angle + kFullTurn) / 2);
+    if (at != edges.end() && at->ends == ends) limits_[e] = std::max(least_limit_, (at->angle + kFullTurn) / 2);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include "subvol/base/types.h"
 #include "subvol/fit/features/quality_caps.h"
+#include "subvol/fit/tuning/quality_tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -40,7 +41,8 @@ class BoundaryFolds {
   };
 
   /// mesh: passes `validate` except for unused vertices. Edges of four boundary faces and more are left out.
-  explicit BoundaryFolds(const VolumeMesh& mesh);
+  /// least_limit: least limit of the angles, in degrees.
+  explicit BoundaryFolds(const VolumeMesh& mesh, double least_limit = QualityTuning{}.least_fold_limit);
   /// The edges of another one of which all cells are among these, with their limits. cells: ascending; a cell gets its
   /// place in this list as its number.
   BoundaryFolds(const BoundaryFolds& whole, std::span<const Index> cells);
@@ -66,6 +68,7 @@ class BoundaryFolds {
     return {wedges_.data() + offsets_[edge], offsets_[edge + 1] - offsets_[edge]};
   }
 
+  double least_limit_;
   std::vector<std::size_t> offsets_{0};
   std::vector<Wedge> wedges_;  ///< of each edge: first that at one boundary face, last that at the other
   std::vector<double> limits_;

@@ -426,12 +426,11 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
   return steps.step();
 }
 
-/// Makes a point of one lane ten times as stiff: both its frozen numbers and their part of `mean_blocks`.
+/// Makes a point of one lane stiffer: both its frozen numbers and their part of `mean_blocks`.
 void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane) {
-  constexpr double kStiffeningFactor = 10;  // the factor; docs/fitting.md, "Steps"
   const int size = frozen_size(kernels_->coupled);
   Wide more[kMostFrozen];
-  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffeningFactor, more);
+  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, tuning_.stiffening_factor, more);
   Wide* blocks = &group.mean_blocks[54 * batch];
   kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
 }
@@ -509,7 +508,6 @@ void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasi
 /// Weighs the points by the weights of their cells and, with an emphasis, by the shape of the cells at these nodes; the
 /// mean of all weights is 1.
 void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
-  constexpr double kFairShape = 0.6;  // scaled Jacobian from which on a point gets no emphasis
   for (CellGroup& group : groups_) group.point_weights.clear();
   if (!has_emphasis() && cell_weights_.empty()) return;
   std::vector<std::vector<Wide>> weights;
@@ -524,7 +522,7 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
       Mat3 f;
       for (int e = 0; e < 9; ++e) f(e / 3, e % 3) = batch.jacobian[e][l];
       const double shape = f.determinant() / (f.col(0).norm() * f.col(1).norm() * f.col(2).norm());
-      const double lack = shape > 0 ? std::max(0.0, 1 - shape / kFairShape) : 1;  // 1 also for NaN
+      const double lack = shape > 0 ? std::max(0.0, 1 - shape / tuning_.fair_shape) : 1;  // 1 also for NaN
       weight[l] *= 1 + std::max(emphasis_, own_emphasis_[groups_[g].batches[b][l]]) * lack * lack;
     }
   };
@@ -542,13 +540,11 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
 }
 
 void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3> nodes) {
-  constexpr int kMostPointsPerDirection = 25;  // more points cost more than they gain (measured)
-  constexpr double kFirstEmphasis = 4;         // then doubled with each refinement
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
       throw InputError("HighOrderEnergy: there is no cell " + std::to_string(c));
-    points_[c] = std::min(std::max(points_[c], kMostPointsPerDirection), 2 * points_[c] - 1);
-    own_emphasis_[c] = std::min(most_own_emphasis_, std::max(kFirstEmphasis, 2 * own_emphasis_[c]));
+    points_[c] = std::min(std::max(points_[c], tuning_.most_points_per_direction), 2 * points_[c] - 1);
+    own_emphasis_[c] = std::min(most_own_emphasis_, std::max(tuning_.first_emphasis, 2 * own_emphasis_[c]));
   }
   rebuild_groups();
   weigh_points(nodes);

@@ -7,6 +7,7 @@
 #include "subvol/fit/energies/distortion.h"
 #include "subvol/fit/energies/volume_term.h"
 #include "subvol/fit/simd/wide.h"
+#include "subvol/fit/tuning/curved_tuning.h"
 
 #include <array>
 #include <cstdint>
@@ -95,6 +96,8 @@ class HighOrderEnergy final : public RegularizedTerm {
   void set_hinge(double weight, double threshold);
   /// Sets the largest k_c that repeated quadrature refinement leads to, initially 256; 0: refinement adds no emphasis.
   void set_most_own_emphasis(double most) { most_own_emphasis_ = most; }
+  /// Sets the numbers of refinements, emphasis and stiffening.
+  void set_tuning(const CurvedTuning& tuning) { tuning_ = tuning; }
 
  private:
   bool is_coupled() const { return epsilon_ > 0 || kernels_->coupled; }
@@ -132,6 +135,7 @@ class HighOrderEnergy final : public RegularizedTerm {
   double floor_ = kHessianFloor;
   double epsilon_ = 0;                ///< of the regularized barrier; 0: that of `kernels_`
   std::vector<double> cell_weights_;  ///< empty: all cells weigh the same
+  CurvedTuning tuning_;
   double emphasis_ = 0, most_own_emphasis_ = 256;
   double hinge_weight_ = 0, hinge_threshold_ = 0;
   std::vector<double> own_emphasis_;  ///< per cell: emphasis by quadrature refinement; 0: not refined

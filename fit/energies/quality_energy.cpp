@@ -20,19 +20,10 @@ namespace {
 
 // Per direction, the corners among them; dense after `densify`.
 constexpr int kQualityPointsPerDirection = 3, kDensePoints = 5;
-constexpr double kInnerWeight = 1.0 / 16;       // a_q of points that are no corners
 constexpr double kLeastDirectionLength = 1e-9;  // lengths of directions are not below this share of the cell's
-// The energy uses a larger share, which bounds its derivatives. A folded cell had a direction of length 1e-7 at a
-// point; its Hessian was 1e13 times that of other cells, and no vertex of the patch around it moved.
-constexpr double kLeastEnergyLength = 0.05;
-constexpr double kNoCap = 1;            // scaled Jacobians are at most 1
-constexpr double kBelowCap = 0.02;      // goals at caps are lower than the caps by this,
-constexpr double kLeastGoal = 0.01;     // but not below this: caps are 0 where edges are flat
-constexpr double kLeastGoalShare = -1;  // no inverted cell is worse than another one
-constexpr double kFoldGoal = 0.5;       // residual of a fold that is good enough: 330 degrees if the limit is 300
-/// Factors on the emphasis of a cell that is below its goal, or above it, and the largest emphasis. It rises within a
-/// few rounds and falls slowly, so that a cell which has just reached its goal stays there.
-constexpr double kCellEmphasisRise = 2.5, kCellEmphasisFall = 0.97, kMostCellEmphasis = 1000;
+constexpr double kNoCap = 1;                    // scaled Jacobians are at most 1
+constexpr double kLeastGoalShare = -1;          // no inverted cell is worse than another one
+constexpr double kFoldGoal = 0.5;  // residual of a fold that is good enough: 330 degrees if the limit is 300
 
 constexpr double kSamePlace = 1e-12;  // in canonical coordinates
 
@@ -144,7 +135,7 @@ struct QualityEnergy::CellSums {
   }
 };
 
-QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction) {
+QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction, double inner_weight) {
   Points points{make_element_rule(kind, points_per_direction), {}, {}, {}, {}};
   points.jacobians = PointJacobians(points.rule);
   const double corner_weight = 1.0 / cell_topology(kind).num_trivalent;
@@ -152,13 +143,14 @@ QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_d
     const int corner = corner_at(kind, at);
     points.corner.push_back(corner);
     points.edge.push_back(corner >= 0 ? -1 : edge_at(kind, at));
-    points.weights.push_back(kind == CellKind::tet ? 1 : corner >= 0 ? corner_weight : kInnerWeight);
+    points.weights.push_back(kind == CellKind::tet ? 1 : corner >= 0 ? corner_weight : inner_weight);
   }
   return points;
 }
 
-QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths)
+QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths, const QualityTuning& tuning)
     : mesh_(&mesh),
+      tuning_(tuning),
       lengths_(lengths.begin(), lengths.end()),
       dense_(mesh.num_cells(), 0),
       corner_emphasis_(mesh.cell_vertices.size(), 1),
@@ -170,8 +162,8 @@ QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengt
   for (const Vec3& h : lengths)
     if (!(h.minCoeff() > 0) || !h.allFinite()) throw InputError("QualityEnergy: lengths must be positive and finite");
   for (int kind = 0; kind < kNumCellKinds; ++kind)
-    points_[kind] = {make_points(static_cast<CellKind>(kind), kQualityPointsPerDirection),
-                     make_points(static_cast<CellKind>(kind), kDensePoints)};
+    points_[kind] = {make_points(static_cast<CellKind>(kind), kQualityPointsPerDirection, tuning.inner_weight),
+                     make_points(static_cast<CellKind>(kind), kDensePoints, tuning.inner_weight)};
   const std::vector<int> colors = color_cells(mesh);
   const int num_colors = colors.empty() ? 0 : *std::max_element(colors.begin(), colors.end()) + 1;
   color_offsets_.assign(num_colors + 1, 0);
@@ -183,11 +175,14 @@ QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengt
 }
 
 QualityEnergy::QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part, std::span<const Index> cells)
-    : QualityEnergy(part, [&] {
-        std::vector<Vec3> lengths;
-        for (const Index c : cells) lengths.push_back(whole.lengths_[c]);
-        return lengths;
-      }()) {
+    : QualityEnergy(
+          part,
+          [&] {
+            std::vector<Vec3> lengths;
+            for (const Index c : cells) lengths.push_back(whole.lengths_[c]);
+            return lengths;
+          }(),
+          whole.tuning_) {
   weights_ = whole.weights_;
   if (!whole.caps_of_cell_.empty()) caps_of_cell_.assign(cells.size(), kNoIndex);
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -244,7 +239,7 @@ void QualityEnergy::set_caps(std::span<const EdgeCap> edges, std::span<const Ver
 
 void QualityEnergy::forbid_folds(std::span<const EdgeCap> edges, double least_edge) {
   live_edge_ = least_edge;
-  folds_.emplace(*mesh_);
+  folds_.emplace(*mesh_, tuning_.least_fold_limit);
   folds_->want(edges, *mesh_);
   fold_emphasis_.assign(folds_->size(), 1);
 }
@@ -265,7 +260,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
   std::array<Vec3, kMaxCellVertices> x;
   for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
   const Vec3& h = lengths_[cell];
-  const double least_length = kLeastEnergyLength * h.minCoeff();
+  const double least_length = tuning_.least_length * h.minCoeff();
   double energy = 0;
   const auto add = [&](std::size_t q, double weight, double residual, const std::array<Vec3, 3>& derivatives) {
     energy += weight * residual * residual;
@@ -441,9 +436,9 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
 
 QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, double goal) {
   std::vector<double> least(mesh_->num_cells()), shares(mesh_->num_cells());
-  const auto update = [](double share, double& emphasis) {
-    emphasis = share < 1 ? std::min(kMostCellEmphasis, kCellEmphasisRise * emphasis)
-                         : std::max(1.0, kCellEmphasisFall * emphasis);
+  const auto update = [this](double share, double& emphasis) {
+    emphasis = share < 1 ? std::min(tuning_.most_emphasis, tuning_.emphasis_rise * emphasis)
+                         : std::max(1.0, tuning_.emphasis_fall * emphasis);
   };
 #pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < least.size(); ++c) {
@@ -457,7 +452,8 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
       const Frame frame(points.rule.point(q), x.data(), kLeastDirectionLength * lengths_[c].minCoeff());
       const double s = frame.s;
       const double at_cap = cap(c, points, q);
-      const double own_goal = at_cap < kNoCap ? std::min(goal, std::max(kLeastGoal, at_cap - kBelowCap)) : goal;
+      const double own_goal =
+          at_cap < kNoCap ? std::min(goal, std::max(tuning_.least_goal, at_cap - tuning_.below_cap)) : goal;
       double share = std::clamp(s / own_goal, kLeastGoalShare, 1.0);
       if (live_edge_ > 0 && points.corner[q] >= 0)
         for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (live_edge_ * lengths_[c][k]));

@@ -7,6 +7,7 @@
 #include "subvol/fit/energies/point_jacobians.h"
 #include "subvol/fit/energies/volume_term.h"
 #include "subvol/fit/features/quality_caps.h"
+#include "subvol/fit/tuning/quality_tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -56,7 +57,7 @@ class QualityEnergy final : public VolumeTerm {
  public:
   /// mesh     must outlive the energy; its positions are not read. InputError: as for `CellBlocks`.
   /// lengths  h_i of each cell: positive and finite, in the unit of the nodes, else InputError.
-  QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths);
+  QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths, const QualityTuning& tuning = {});
 
   /// The energy of some cells of another one, with their lengths, caps and numbers of points, the weights, and no
   /// emphasis. part: a mesh of these cells in this order, which must outlive the energy.
@@ -125,7 +126,7 @@ class QualityEnergy final : public VolumeTerm {
   };
   struct CellSums;
 
-  static Points make_points(CellKind kind, int points_per_direction);
+  static Points make_points(CellKind kind, int points_per_direction, double inner_weight);
   const Points& points_of(std::size_t cell) const {
     return points_[static_cast<std::size_t>(mesh_->kinds[cell])][dense_[cell]];
   }
@@ -144,6 +145,7 @@ class QualityEnergy final : public VolumeTerm {
                               BlockSparse* hessian) const;
 
   const VolumeMesh* mesh_;
+  QualityTuning tuning_;
   std::vector<Vec3> lengths_;
   QualityWeights weights_;
   std::array<std::array<Points, 2>, kNumCellKinds> points_;  ///< by kind, with three and with five a direction

@@ -16,7 +16,7 @@ namespace {
 
 /// near_target  the grid at its fitted positions.  h: mean length of the edges of its boundary, if a curve is lost.
 EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, const TriangleMesh& target,
-                     const SignedFeatures& features, FeatureRouting routing, double h) {
+                     const SignedFeatures& features, FeatureRouting routing, double h, const QualityTuning& tuning) {
   EdgeLayout layout;
   layout.routing = std::move(routing);
   layout.patched = patched_mesh(grid, near_target.positions, layout.routing, target);
@@ -25,7 +25,7 @@ EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, cons
   layout.pads = add_pads(layout.patched, features);
   NarrowStrips strips = follow_narrow_strips(layout.patched, layout.routing, groups, target, features, h);
   std::ranges::move(strips.pads, std::back_inserter(layout.pads.pads));
-  layout.caps = quality_caps(layout.patched, features);
+  layout.caps = quality_caps(layout.patched, features, tuning);
   layout.tagged_mesh = layout.patched.mesh;
   const std::vector<CreasePath> paths = paths_of_parts(layout.patched.paths, features.curves.curves.size());
   layout.creases = FollowedCreases(followed_parts(near_target, features, layout.routing), paths, layout.tagged_mesh);
@@ -44,7 +44,7 @@ EdgeLayout layout_of(const VolumeMesh& grid, const VolumeMesh& near_target, cons
 }  // namespace
 
 EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
-                       const SignedFeatures& features, const RoutingOptions& options) {
+                       const SignedFeatures& features, const RoutingOptions& options, const QualityTuning& tuning) {
   VolumeMesh near_target = grid;
   near_target.positions.assign(fitted.begin(), fitted.end());
   const FeatureRouting routing = route_features(near_target, features, options);
@@ -52,7 +52,7 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   std::vector<Index> beside = strips_in_parts(routing, target, features, h);
   while (true) {
     EdgeLayout layout =
-        layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), h);
+        layout_of(grid, near_target, target, features, without_parts(routing, beside, features.curves), h, tuning);
     // Curves that no strip follows are followed in parts again.
     const auto is_lost = [&](Index c) {
       return std::ranges::find(layout.routing.unfollowed, c, &UnfollowedCurve::curve) !=

@@ -39,6 +39,6 @@ struct EdgeLayout {
 /// target   oriented outward, in the coordinates of the fitted positions; features: its own.
 /// InputError: as the functions named.
 EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
-                       const SignedFeatures& features, const RoutingOptions& options);
+                       const SignedFeatures& features, const RoutingOptions& options, const QualityTuning& tuning = {});
 
 }  // namespace subvol::internal

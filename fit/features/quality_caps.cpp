@@ -16,10 +16,6 @@ namespace subvol::internal {
 
 namespace {
 
-/// Share of the best possible scaled Jacobian that is asked for.
-constexpr double kReachableShare = 0.93;
-/// Bound at corners of several cells; with 0.55 a pyramid got 0.53, with this 0.66.
-constexpr double kCornerCap = 0.8;
 /// Distance, as a share of a curve's length, at which its direction at a corner is measured.
 constexpr double kDirectionShare = 0.05;
 
@@ -30,18 +26,18 @@ void require_curves(const PatchedMesh& patched, const SignedFeatures& features) 
       throw InputError("quality_caps: there is no curve " + std::to_string(path.curve));
 }
 
-double edge_cap(double angle, int cells) {
+double edge_cap(double angle, int cells, double reachable_share) {
   const double part = std::min(180.0, angle / cells);
-  return kReachableShare * std::max(0.0, std::sin(part * std::numbers::pi / 180));
+  return reachable_share * std::max(0.0, std::sin(part * std::numbers::pi / 180));
 }
 
-std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features, double reachable_share) {
   const MeshTopology topology(patched.mesh);
   std::vector<EdgeCap> caps;
   for (const CreasePath& path : patched.paths) {
     const double angle = features.angles[path.curve];
     for (Index edge : edges_of_path(topology, path.vertices))
-      caps.push_back({topology.edge(edge), edge_cap(angle, topology.num_edge_cells(edge)), angle});
+      caps.push_back({topology.edge(edge), edge_cap(angle, topology.num_edge_cells(edge), reachable_share), angle});
   }
   std::ranges::sort(caps, {}, &EdgeCap::ends);
   return caps;
@@ -59,7 +55,8 @@ std::map<Index, std::vector<Vec3>> directions_at_ends(const PatchedMesh& patched
   return directions;
 }
 
-std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatures& features,
+                                   const QualityTuning& tuning) {
   std::vector<int> cells(patched.mesh.num_vertices(), 0);
   for (Index v : patched.mesh.cell_vertices) ++cells[v];
   const auto directions = directions_at_ends(patched, features);
@@ -70,16 +67,16 @@ std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatu
     if (is_repeated || at == directions.end() || at->second.size() < 3) continue;
     const auto& t = at->second;
     const double best = std::abs(t[0].dot(t[1].cross(t[2])));
-    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachableShare * best : kCornerCap});
+    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? tuning.reachable_share * best : tuning.corner_cap});
   }
   return caps;
 }
 
 }  // namespace
 
-QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features, const QualityTuning& tuning) {
   require_curves(patched, features);
-  return {edge_caps(patched, features), corner_caps(patched, features)};
+  return {edge_caps(patched, features, tuning.reachable_share), corner_caps(patched, features, tuning)};
 }
 
 }  // namespace subvol::internal

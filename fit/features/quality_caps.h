@@ -3,6 +3,7 @@
 
 #include "subvol/fit/features/pads.h"
 #include "subvol/fit/features/signed_features.h"
+#include "subvol/fit/tuning/quality_tuning.h"
 
 #include <array>
 #include <vector>
@@ -39,6 +40,6 @@ struct QualityCaps {
 /// the angle at each edge, cells at one curve of i10 fell from a scaled Jacobian of 0.61 to 0.32.
 /// features  those that were routed. InputError: a path along something that is not an edge of the mesh, or of a curve
 /// that does not exist. Cost: one pass over the mesh.
-QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features);
+QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features, const QualityTuning& tuning = {});
 
 }  // namespace subvol::internal

@@ -16,10 +16,6 @@ struct LiftValues {
 };
 /// Emphasis on places of poor shape, and weight of the hinge (`HighOrderEnergy`).
 inline constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
-inline constexpr int kLiftSteps = 8;  ///< of the minimization with one value
-/// The threshold of the hinge is the quality aimed at plus this. At order 4, a bone of 87 hexes came to a least scaled
-/// Jacobian of 0.66 with 0.05, and to 0.76 with 0.2; a double torus gained nothing with 0.35.
-inline constexpr double kHingeAboveQuality = 0.2;
 
 /// Returns the cells whose least scaled Jacobian is below this quality, the poorest first.
 inline std::vector<Index> poor_cells(std::span<const double> cell_minima, double quality) {
@@ -34,16 +30,17 @@ inline std::vector<Index> poor_cells(std::span<const double> cell_minima, double
 enum class Again { kept, undone, ended };
 
 /// Repeats a minimization around poor cells with higher and higher values of a setting. A value that does not help may
-/// be too low to change the worst cell, so two higher ones are attempted as well before this ends.
+/// be too low to change the worst cell, so higher ones are attempted as well before this ends.
 ///
+/// most_failed       number of values in a row without a gain that end it (`CurvedTuning::most_failed_lifts`).
 /// is_poor()         true while there are cells to lift.
 /// run_again(value)  minimizes with this value, and rolls back if the result is not better.
 /// returns           `ended`, or else `kept`.
 template <class IsPoor, class RunAgain>
-Again lift(double setting, const LiftValues& values, const IsPoor& is_poor, const RunAgain& run_again) {
-  constexpr int kMostFailedLifts = 3;  // in a row; the next value may still help after one or two that do not
+Again lift(double setting, const LiftValues& values, int most_failed, const IsPoor& is_poor,
+           const RunAgain& run_again) {
   double attempted = setting;
-  for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < values.last;) {
+  for (int failures = 0; failures < most_failed && is_poor() && attempted < values.last;) {
     attempted = attempted == 0 ? values.first : values.factor * attempted;
     const Again last = run_again(attempted);
     if (last == Again::ended) return last;

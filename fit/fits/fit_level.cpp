@@ -18,11 +18,6 @@ namespace {
 /// Most refinements of the boundary for samples, on the finest level and on those below, which follow the target only
 /// roughly.
 constexpr int kMaxSampleRefinements = 3, kMaxCoarseRefinements = 1;
-/// kMeshShare: position of the finest level's samples between the limit surface (0) and the mesh (1).
-/// kMostMeshLimitGap: largest mean gap between the two for which the mesh is considered (in the mesh's unit; in a fit,
-/// shares of the target's diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit
-/// surface away from it.
-constexpr double kMeshShare = 0.3, kMostMeshLimitGap = 5e-4;
 
 /// Takes the vertices of the boundary and of interfaces of a hex mesh as samples, without the limit map.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
@@ -121,12 +116,13 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     double gap = 0;
     for (std::size_t i = 0; i < on_limit.size(); ++i) gap += (on_limit[i] - on_mesh[i]).norm();
     // A tolerance applies to both surfaces.
-    if (options.tolerance_percent || gap <= kMostMeshLimitGap * static_cast<double>(on_limit.size()))
+    if (options.tolerance_percent ||
+        gap <= options.tuning.fitting.most_mesh_limit_gap * static_cast<double>(on_limit.size()))
       towards_mesh = compose(bilinear, level.nodes);
   }
   if (!towards_mesh) boundary = refine_sheets(level.mesh, finest ? std::max(refinements, 1) : refinements);
   level.samples = compose(boundary.positions, fine_from_unknowns);
-  if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
+  if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, options.tuning.fitting.mesh_share);
   level.crease_edges = std::move(boundary.crease_edges);
   for (std::size_t k = 0; k < boundary.quads.size(); ++k) {
     const auto& q = boundary.quads[k];

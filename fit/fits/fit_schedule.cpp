@@ -8,26 +8,12 @@ namespace subvol::internal {
 
 namespace {
 
-/// Initial distance (in V/A) below which the template's own cells indicate the shape of the fitted cells (measured on
-/// real templates).
-constexpr double kCloseDistance = 0.4;
-/// Lambda if creases are drawn to the target from the start: stiffer cells swell beside the creases, and the folds that
-/// this makes do not disappear later.
-constexpr double kHeldLambda = 0.01;
-/// Stages that take many steps solve their systems roughly and keep the cells' Hessian, which makes a step cheaper. A
-/// continuation does neither: its few steps must free every cell.
-constexpr double kRoughTolerance = 0.3;
-constexpr int kHessianLife = 4;  // steps
-/// Accelerated steps decrease E by more, so these stages end at larger decreases than others: E is then what it is at
-/// the end of many more plain steps.
-constexpr double kAcceleratedDecrease = 5e-3;
-
-Stage rough_stage(double lambda, double tangential_weight) {
+Stage rough_stage(double lambda, double tangential_weight, const FitTuning& tuning) {
   Stage stage{lambda, tangential_weight};
-  stage.linear_tolerance = kRoughTolerance;
-  stage.hessian_life = kHessianLife;
+  stage.linear_tolerance = tuning.rough_tolerance;
+  stage.hessian_life = tuning.hessian_life;
   stage.accelerates = true;
-  stage.relative_decrease = kAcceleratedDecrease;
+  stage.relative_decrease = tuning.accelerated_decrease;
   return stage;
 }
 
@@ -40,7 +26,9 @@ std::vector<Stage> FitSchedule::stages(int number) const {
   return result;
 }
 
-Stage FitSchedule::final_stage(double lambda) const { return rough_stage(lambda, kCloseTangentialWeight); }
+Stage FitSchedule::final_stage(double lambda) const {
+  return rough_stage(lambda, tuning.close_tangential_weight, tuning);
+}
 
 double FitSchedule::share_at_end(int number, bool raises_quality) const {
   // A step of a level costs about a quarter of one of the next: that has eight times the cells, but fewer quadrature
@@ -55,19 +43,22 @@ double FitSchedule::share_at_end(int number, bool raises_quality) const {
   return before / all;
 }
 
-std::vector<double> own_box_shares(double distance) {
-  return distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
+std::vector<double> own_box_shares(double distance, const FitTuning& tuning) {
+  return distance < tuning.close_distance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
 }
 
 FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold) {
+  const FitTuning& tuning = options.tuning.fitting;
   FitSchedule schedule;
+  schedule.tuning = tuning;
   schedule.levels = options.levels;
-  schedule.own_box_shares = own_box_shares(distance);
-  const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
-  schedule.first = {rough_stage(coarse, kFarTangentialWeight), rough_stage(coarse, kCloseTangentialWeight)};
-  schedule.middle = {rough_stage(coarse, kCloseTangentialWeight)};
+  schedule.own_box_shares = own_box_shares(distance, tuning);
+  const double coarse = std::max(creases_hold ? tuning.held_lambda : tuning.coarse_lambda, options.lambda_close);
+  schedule.first = {rough_stage(coarse, tuning.far_tangential_weight, tuning),
+                    rough_stage(coarse, tuning.close_tangential_weight, tuning)};
+  schedule.middle = {rough_stage(coarse, tuning.close_tangential_weight, tuning)};
   schedule.last = {schedule.final_stage(options.lambda_close)};
-  schedule.continuation = {coarse, kFarTangentialWeight, 4};
+  schedule.continuation = {coarse, tuning.far_tangential_weight, 4};
   return schedule;
 }
 

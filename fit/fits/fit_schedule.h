@@ -8,19 +8,6 @@
 
 namespace subvol::internal {
 
-/// A fit without a tolerance lowers lambda further until the mean distance is below this, in percent of the diagonal.
-inline constexpr double kDefaultAccuracyPercent = 0.015;
-/// Least lambda, as a share of `FitOptions::lambda_close`, without and with a tolerance.
-inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
-/// Largest lambda that is tried if the boundary of a fit intersects itself.
-inline constexpr double kMostUnfoldingLambda = 0.1;
-/// Lambda is not lowered any further if a stage reduces the mean distance by less than this share.
-inline constexpr double kLeastLambdaHalvingGain = 0.01;
-/// Without a tolerance, the largest total decrease of the mean scaled Jacobian that lowering lambda may cause.
-inline constexpr double kMostShapeLoss = 0.0075;
-/// The corresponding limit for cage-only fits, in which few degrees of freedom have to reach the whole surface.
-inline constexpr double kMostCageShapeLoss = 0.015;
-
 /// The minimizations of a recursive fit.
 ///
 /// Lambda is low from the start: a stiff start (lambda > 0.05) shrinks and rounds the template and loses features that
@@ -32,6 +19,7 @@ struct FitSchedule {
   int levels = 0;
   std::vector<Stage> first, middle, last;  ///< stages of level 1, of the levels between, and of the finest level
   Stage continuation;
+  FitTuning tuning;
 
   /// Returns the stages of a level; if there is only one level, those of `first` and `last`.
   std::vector<Stage> stages(int number) const;
@@ -51,7 +39,7 @@ inline constexpr double kExpectedLevelSteps = 12;
 /// Returns the `own_share` values (`ideal_boxes`) to be tried on level 1, first choice first.
 ///
 /// distance  as in `make_schedule`.
-std::vector<double> own_box_shares(double distance);
+std::vector<double> own_box_shares(double distance, const FitTuning& tuning);
 
 /// Makes the schedule of a fit.
 ///

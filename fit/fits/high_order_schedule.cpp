@@ -5,39 +5,31 @@
 
 namespace subvol::internal {
 
-namespace {
-
-/// Lambda of a stiff approach: 20 times that of other stages.
-constexpr double kStiffLambda = 1;
-constexpr int kMaxIterations = 40;  // steps of a stage; most end earlier
-/// Stiff stages only lead the way: after this many steps, the next stage makes faster progress.
-constexpr int kStiffIterations = 10;
-/// Order from which on a stiff approach lowers lambda.
-constexpr int kStiffOrder = 4;
-
-}  // namespace
-
-Stage HighOrderSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight, kMaxIterations}; }
+Stage HighOrderSchedule::final_stage(double lambda) const {
+  return {lambda, fitting.close_tangential_weight, curved.most_steps};
+}
 
 std::vector<Stage> HighOrderSchedule::stages(Approach approach, int order, int last_order) const {
   const bool last = order == last_order;
   std::vector<Stage> result;
   if (approach == Approach::direct) {
-    if (order == 1) result.push_back({kCoarseLambda, kFarTangentialWeight});
-    if (!last) result.push_back(final_stage(kCoarseLambda));
+    if (order == 1) result.push_back({fitting.coarse_lambda, fitting.far_tangential_weight});
+    if (!last) result.push_back(final_stage(fitting.coarse_lambda));
   } else {
-    const int turn = std::min(kStiffOrder, last_order);
-    if (order <= turn) result.push_back({kStiffLambda, 1, kStiffIterations});
-    if (order == turn) result.push_back({0.2, 0.3, kStiffIterations});
-    if (order >= turn) result.push_back({kCoarseLambda, kFarTangentialWeight});
+    const int turn = std::min(curved.stiff_order, last_order);
+    if (order <= turn) result.push_back({curved.stiff_lambda, 1, curved.stiff_steps});
+    if (order == turn) result.push_back({0.2, 0.3, curved.stiff_steps});
+    if (order >= turn) result.push_back({fitting.coarse_lambda, fitting.far_tangential_weight});
   }
   if (last) result.push_back(final_stage(lambda_close));
   return result;
 }
 
-HighOrderSchedule make_high_order_schedule(double lambda_close, double distance) {
+HighOrderSchedule make_high_order_schedule(double lambda_close, double distance, const Tuning& tuning) {
   HighOrderSchedule schedule;
-  const std::vector<double> shares = own_box_shares(distance);
+  schedule.fitting = tuning.fitting;
+  schedule.curved = tuning.curved;
+  const std::vector<double> shares = own_box_shares(distance, tuning.fitting);
   schedule.far = shares.front() < 1;
   schedule.tries = {{Approach::direct, shares[0]}};
   if (schedule.far)

@@ -24,6 +24,8 @@ struct HighOrderTry {
 struct HighOrderSchedule {
   std::vector<HighOrderTry> tries;  ///< in this order; a later one is made if those before went wrong (see below)
   double lambda_close = 0;          ///< lambda of the very last stage
+  FitTuning fitting;
+  CurvedTuning curved;
 
   bool far = false;  ///< true if the template is so far away that its cells do not indicate the wanted shapes
   /// Returns the order up to which attempts are compared and all entities have the same order; the fit's `order` caps
@@ -37,17 +39,10 @@ struct HighOrderSchedule {
   Stage final_stage(double lambda) const;
 };
 
-/// For a far template, another attempt is made at the first orders if the boundary is folded, or if the mean distance,
-/// in percent of the diagonal, exceeds kFairDistancePercent and E_W exceeds kFairDistortion: the cells are distorted
-/// and still far from the target, so their resolution is not the cause.
-inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
 /// Below this order, the distance does not show if an approach went wrong.
 inline constexpr int kTellingOrder = 4;
 
-/// Largest lambda that is tried if the boundary of a fit intersects itself.
-inline constexpr double kMostUnfoldingLambdaOfOrders = 1;
-
 /// distance  mean distance between template and target, divided by the target's length V/A.
-HighOrderSchedule make_high_order_schedule(double lambda_close, double distance);
+HighOrderSchedule make_high_order_schedule(double lambda_close, double distance, const Tuning& tuning);
 
 }  // namespace subvol::internal

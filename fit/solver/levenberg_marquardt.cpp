@@ -16,13 +16,18 @@ namespace subvol::internal {
 
 namespace {
 
-/// Range of mu, and of its product with a local factor: relative to the diagonal of the Hessian, 1e4 stops a degree of
-/// freedom, and 1e-4 has hardly any effect.
-constexpr double kLeastDamping = 1e-4, kMostDamping = 1e4;
-/// Factors on mu after a step that was taken at once, and one that was not.
-constexpr double kDampingFall = 0.3, kDampingRise = 6;
+/// Largest mu, relative to the diagonal of the Hessian: it stops a degree of freedom.
+constexpr double kMostDamping = 1e4;
 constexpr double kMostLocalDamping = 1e6;  // largest local factor, so that it can fall again within a few steps
-constexpr int kMostTrials = 8;             // of a step, each with a larger mu: kDampingRise^8 = 1.7e6
+constexpr int kMostTrials = 8;             // of a step, each with a larger mu
+
+/// Return mu after a step that was not taken at once, and after one that was.
+double raised(double damping, const QualityTuning& tuning) {
+  return std::min(kMostDamping, tuning.damping_rise * damping);
+}
+double lowered(double damping, const QualityTuning& tuning) {
+  return std::max(tuning.least_damping, tuning.damping_fall * damping);
+}
 
 /// Returns the cells whose energy rises most, as few as account for half of all rises.
 std::vector<Index> most_risen(std::span<const double> before, std::span<const double> after) {
@@ -73,7 +78,7 @@ class LevenbergMarquardtRun : MinimizerRun {
 
 LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
     : MinimizerRun(problem, x, options) {
-  damping_ = damping_after(options.first_damping, result_.iterations);
+  damping_ = damping_after(options.first_damping, result_.iterations, options.damping);
   local_damping_.assign(x.size(), 1);
   uncertified_ = problem.volume->uncertified(y_);
 }
@@ -112,10 +117,10 @@ void LevenbergMarquardtRun::shorten_at(std::span<const Index> cells, double fact
 }
 
 void LevenbergMarquardtRun::damp_where_shortened() {
+  const double rise = options_.damping.damping_rise, fall = options_.damping.damping_fall;
   for (std::size_t j = 0; j < local_damping_.size(); ++j) {
     double& local = local_damping_[j];
-    local =
-        shortened_[j] != 0 ? std::min(kMostLocalDamping, kDampingRise * local) : std::max(1.0, kDampingFall * local);
+    local = shortened_[j] != 0 ? std::min(kMostLocalDamping, rise * local) : std::max(1.0, fall * local);
   }
 }
 
@@ -181,7 +186,7 @@ bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
     ++record.evaluations;
     if (shorten_until_downhill()) return true;
     if (result_.stop == MinimizerStop::cancelled) return false;
-    damping_ = std::min(kMostDamping, kDampingRise * damping_);
+    damping_ = raised(damping_, options_.damping);
   }
   return false;
 }
@@ -209,7 +214,7 @@ MinimizerResult LevenbergMarquardtRun::run() {
       if (result_.stop == MinimizerStop::cancelled) return std::move(result_);
       return end(MinimizerStop::no_step, "no step decreases the energy");
     }
-    if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kDampingFall * damping_);
+    if (record.evaluations == 1) damping_ = lowered(damping_, options_.damping);
     damp_where_shortened();
     if (!take_accelerated_step(1, record)) take_step(1, record);
     if (is_done(record)) return std::move(result_);
@@ -224,11 +229,11 @@ MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Ve
   return LevenbergMarquardtRun(problem, x, options).run();
 }
 
-double damping_after(double first, std::span<const IterationRecord> steps) {
+double damping_after(double first, std::span<const IterationRecord> steps, const QualityTuning& tuning) {
   double damping = first;
   for (const IterationRecord& step : steps) {
-    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kDampingRise * damping);
-    if (step.evaluations == 1) damping = std::max(kLeastDamping, kDampingFall * damping);
+    for (int trial = 1; trial < step.evaluations; ++trial) damping = raised(damping, tuning);
+    if (step.evaluations == 1) damping = lowered(damping, tuning);
   }
   return damping;
 }

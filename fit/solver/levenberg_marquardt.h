@@ -35,6 +35,6 @@ MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Ve
                                              const MinimizerOptions& options);
 
 /// Returns mu after these steps of a minimization that began with mu = `first`.
-double damping_after(double first, std::span<const IterationRecord> steps);
+double damping_after(double first, std::span<const IterationRecord> steps, const QualityTuning& tuning = {});
 
 }  // namespace subvol::internal

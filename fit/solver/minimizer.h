@@ -3,6 +3,8 @@
 
 #include "subvol/base/types.h"
 #include "subvol/fit/solver/iteration_record.h"
+#include "subvol/fit/tuning/curved_tuning.h"
+#include "subvol/fit/tuning/quality_tuning.h"
 
 #include <functional>
 #include <span>
@@ -29,8 +31,6 @@ void densify_again(FitProblem& problem, const MinimizerResult& result);
 
 /// Share of the decrease that the slope promises which a step of a line search must reach: the usual one.
 inline constexpr double kArmijo = 1e-4;
-/// Damping with which the Levenberg-Marquardt method usually begins.
-inline constexpr double kFirstDamping = 1e-3;
 
 struct MinimizerOptions {
   int max_iterations = 20;
@@ -45,7 +45,10 @@ struct MinimizerOptions {
   bool accelerates = false;
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;
-  double first_damping = kFirstDamping;  ///< Levenberg-Marquardt only: mu of the first step, > 0
+  QualityTuning damping{};                       ///< Levenberg-Marquardt only: how mu changes
+  double first_damping = damping.first_damping;  ///< Levenberg-Marquardt only: mu of the first step, > 0
+  /// Newton's method only: number of times that one step may stiffen the cells that block it.
+  int most_stiffenings = CurvedTuning{}.most_stiffenings;
   /// Levenberg-Marquardt only: if E rises, the step is first shortened at the cells whose energy rises most, and damped
   /// only then. Not where these are the cells that have to move.
   bool spares_most = true;

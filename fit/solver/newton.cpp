@@ -73,7 +73,6 @@ bool NewtonRun::has_no_gradient() const {
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
-  constexpr int kMaxStiffenings = 5;  // each makes cells ten times stiffer: docs/fitting.md, "Steps"
   blocking_.clear();
   is_stiffened_ = false;
   for (int round = 0;; ++round) {
@@ -83,7 +82,7 @@ NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
     problem_.nodes.apply(d_, dy_);
     t_ = problem_.volume->max_step(y_, dy_);
     // Points that limit the whole step this much had better stay where they are.
-    const bool may_stiffen = round < kMaxStiffenings;
+    const bool may_stiffen = round < options_.most_stiffenings;
     if (!may_stiffen || t_ >= kShortStep || !problem_.volume->stiffen(y_, dy_, kShortStep)) {
       const Search found = search_line(may_stiffen, record);
       if (found != Search::stiffer) return found;

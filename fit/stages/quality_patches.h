@@ -11,9 +11,6 @@
 
 namespace subvol::internal {
 
-/// Share of all cells up to which patches cost less than the whole mesh.
-inline constexpr double kMostPatchShare = 0.4;
-
 /// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are
 /// ascending.
 struct QualityPatch {

@@ -17,25 +17,15 @@ namespace subvol::internal {
 
 namespace {
 
-/// The threshold of the hinge lies this far above the goal: a squared hinge is not zero where it balances the surface.
-constexpr double kHingeMargin = 0.15;
-/// A coarse mesh needs no more than this below the goal: refining raises the mean, and the lift of the fine mesh the
-/// least.
-constexpr double kCoarseMargin = 0.05;
-constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;  // of the lift of a whole mesh
-
-/// Width of the strip of surface that counts as much as a crease, in edges.
-constexpr double kCreaseEdges = 5;
-
 /// Rings of cells around poor ones that move with them, in one pass over all patches after the other; and the shares of
-/// the goal below which cells are lifted: the first for which patches are small (`kMostPatchShare`).
+/// the goal below which cells are lifted: the first for which patches are small (`QualityTuning::most_patch_share`).
 constexpr std::array<int, 3> kPatchRings{1, 3, 2};
 constexpr std::array<double, 4> kPatchShares{1, 0.85, 0.6, 0.3};
 
 /// Exponent of the norm of all costs of a state (`LiftMerit`).
 constexpr double kCostExponent = 4;
 
-double above(double goal, double margin = kHingeMargin) { return std::min(0.95, goal + margin); }
+double above(double goal, double margin) { return std::min(0.95, goal + margin); }
 
 }  // namespace
 
@@ -56,43 +46,43 @@ void QualitySchedule::give_surface_more_weight(double factor) {
   lift.surface *= factor;
 }
 
-QualitySchedule coarse_quality_schedule(double goal) {
+QualitySchedule coarse_quality_schedule(double goal, const QualityTuning& tuning) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};
   };
   return {{{1, weights(50, 0.3), 6}, {10, weights(50, 0.5), 5}, {100, weights(100, 0.6), 6}},
-          {100, weights(200, goal), kMostCoarseLiftSteps},
-          goal - kCoarseMargin};
+          {100, weights(200, goal), tuning.most_coarse_lift_steps},
+          goal - tuning.coarse_margin};
 }
 
 QualitySchedule smooth_quality_schedule() {
   return {{{1, {.hinge = 50, .threshold = 0.3}, 6}, {10, {.hinge = 50, .threshold = 0.4}, 4}}, {100, {}, 0}, 0.1};
 }
 
-QualitySchedule fine_quality_schedule(double goal) {
+QualitySchedule fine_quality_schedule(double goal, const QualityTuning& tuning) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};
   };
   return {{{20, weights(50, 0.6), 4}, {100, weights(100, above(goal, 0.1)), 5}},
-          {100, weights(200, above(goal)), kMostFineLiftSteps},
+          {100, weights(200, above(goal, tuning.hinge_margin)), tuning.most_fine_lift_steps},
           goal};
 }
 
-QualitySchedule late_quality_schedule(double goal) {
+QualitySchedule late_quality_schedule(double goal, const QualityTuning& tuning) {
   // Of joint129 at level 2, the worst cell rises from 0.08 to 0.60 with these weights while no distance rises by more
   // than 5 %; with those of the fine schedule, the mean distance of the limit surface rises by a third.
   constexpr double kSlightMargin = 0.03, kSlightWeightFactor = 0.02;
   QualityWeights weights{.hinge = 200, .threshold = above(goal, kSlightMargin)};
   weights.cosine *= kSlightWeightFactor;
   weights.twist *= kSlightWeightFactor;
-  QualitySchedule schedule{{}, {100, weights, kMostFineLiftSteps}, goal};
-  schedule.far_margin = kLateFarMargin;
+  QualitySchedule schedule{{}, {100, weights, tuning.most_fine_lift_steps}, goal};
+  schedule.far_margin = tuning.late_far_margin;
   return schedule;
 }
 
-QualitySchedule single_quality_schedule(double goal) {
-  QualitySchedule schedule = coarse_quality_schedule(goal);
-  const QualitySchedule fine = fine_quality_schedule(goal);
+QualitySchedule single_quality_schedule(double goal, const QualityTuning& tuning) {
+  QualitySchedule schedule = coarse_quality_schedule(goal, tuning);
+  const QualitySchedule fine = fine_quality_schedule(goal, tuning);
   schedule.lift = fine.lift;
   schedule.goal = fine.goal;
   return schedule;
@@ -100,7 +90,8 @@ QualitySchedule single_quality_schedule(double goal) {
 
 QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes,
                              std::vector<Vec3> fixed, const QualityBoundary& boundary, const TargetSurface& target,
-                             const std::function<CreaseEnergy(double width)>& creases) {
+                             const std::function<CreaseEnergy(double width)>& creases, const QualityTuning& tuning)
+    : tuning_(tuning) {
   // In units of the cells, E_S is w_s times the sum over the boundary faces of the mean squared distance / h^2:
   // K E_S = w_s n 2 L^2 / h^2 E_S for n faces of length h. So E_S + E_Q / K is minimized. Faces of other lengths have
   // other areas, which the factors make up for.
@@ -115,12 +106,12 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
   const double mean_square = squares / count;
   mean_length_ = std::sqrt(mean_square);
   lambda_one_ = mean_square / (2 * count * target.length() * target.length());
-  auto volume = std::make_unique<QualityEnergy>(mesh, lengths);
+  auto volume = std::make_unique<QualityEnergy>(mesh, lengths, tuning);
   energy_ = volume.get();
   std::unique_ptr<ClosestPointEnergy> surface;
   if (boundary.samples.num_rows() > 0) {
     surface = std::make_unique<ClosestPointEnergy>(target, boundary.triangles, boundary.samples.num_rows(),
-                                                   kQualityTangentialWeight, 1, SurfacePull::straight_both_ways);
+                                                   tuning_.tangential_weight, 1, SurfacePull::straight_both_ways);
     for (const Index f : boundary.triangle_faces) {
       factors_.push_back(std::pow(mean_square / square(f), 2));
       triangle_cells_.push_back(topology.face_cells(f)[0]);
@@ -134,7 +125,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
     surface_ = surface.get();
     if (creases) {
       surface->discount_disagreeing();
-      surface->add_creases(creases(kCreaseEdges * mean_length_));
+      surface->add_creases(creases(tuning.crease_edges * mean_length_));
     }
   }
   SparseMap samples = surface ? boundary.samples : SparseMap{nodes.num_cols, {0}, {}, {}};
@@ -146,6 +137,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
 QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x)
     : patch_mesh_(std::make_unique<VolumeMesh>(internal::patch_mesh(*whole.mesh_, patch.cells))),
       mesh_(patch_mesh_.get()),
+      tuning_(whole.tuning_),
       mean_length_(whole.mean_length_),
       lambda_one_(whole.lambda_one_),
       step_work_(static_cast<double>(patch.cells.size()) / static_cast<double>(whole.mesh_->num_cells())) {
@@ -210,12 +202,12 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   problem_->lambda = lambda;
   StageRecord record = record_;
   record.name = name;
-  Stage settings{lambda,  kQualityTangentialWeight, stage.steps, is_lift ? kNoEnd : kLeastDecrease, mean_length_,
+  Stage settings{lambda,  tuning_.tangential_weight, stage.steps, is_lift ? kNoEnd : kLeastDecrease, mean_length_,
                  damping_};
   settings.accelerates = true;
   settings.spares_most = !is_lift;
   const bool going = runner_->run(*problem_, settings, std::move(record), x, *report_, step_work_);
-  damping_ = damping_after(damping_, report_->stages.back().iterations);
+  damping_ = damping_after(damping_, report_->stages.back().iterations, tuning_);
   if (after_stage) after_stage(name, x);
   return going;
 }
@@ -260,7 +252,7 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
 
 /// Returns the patches around some cells; none if they are most of the mesh.
 std::vector<QualityPatch> QualityStages::patches_around(std::span<const Index> centers, int rings) const {
-  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_->num_cells()));
+  const auto most = static_cast<std::size_t>(tuning_.most_patch_share * static_cast<double>(mesh_->num_cells()));
   return quality_patches(*mesh_, *problem_, surface_ ? surface_->triangles() : std::span<const std::array<Index, 3>>{},
                          centers, rings, most);
 }
@@ -309,7 +301,7 @@ bool QualityStages::run_patches(const QualitySchedule& of_patch, std::span<const
   StageRecord record = record_;
   record.name = formatted("%s, %s of %zu patches", record_.name.c_str(), name.c_str(), patches.size());
   record.lambda = lambda_one_ / of_patch.lift.surface;
-  record.tangential_weight = kQualityTangentialWeight;
+  record.tangential_weight = tuning_.tangential_weight;
   record.unknowns = unknowns;
   record.raises_quality = true;
   record.stop = formatted("%zu of %zu patches reached their goal", reached, patches.size());
@@ -335,9 +327,6 @@ bool QualityStages::relax(std::span<const Index> centers, int rings, const Quali
 /// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kLiftRoundSteps = 2, kLiftPatience = 5;  // of a round; rounds without a better state
-  // Share of the poor cells; a round of the whole mesh must leave fewer than that
-  constexpr double kMostPoorShareLeft = 0.7;
   const bool is_patch = patch_mesh_ != nullptr;
   // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:
   // joint129 at level 2 rises to 0.21 by such patches, but to 0.65 if the whole mesh is lifted as long as that helps.
@@ -354,7 +343,7 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
     std::vector<QualityPatch> patches;
     if (is_patch) return patches;
     const std::size_t poor = now.cells.poor.size(), before = std::exchange(poor_before, poor);
-    const bool gains = static_cast<double>(poor) < kMostPoorShareLeft * static_cast<double>(before);
+    const bool gains = static_cast<double>(poor) < tuning_.most_poor_share_left * static_cast<double>(before);
     for (; patches.empty() && pass < kPatchRings.size(); ++pass)
       for (std::size_t i = 0; patches.empty() && i < kPatchShares.size(); ++i) {
         if (i > 0 && (is_whole_cage || (pass == 0 && gains))) return patches;
@@ -362,27 +351,27 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
       }
     return patches;
   };
-  for (int done = 0;; done += kLiftRoundSteps) {
+  for (int done = 0;; done += tuning_.lift_round_steps) {
     State now = inspect(schedule, x);
     if (now.merit > state_.merit) {
       state_ = now;
       best = x;
       since_best = 0;
     }
-    if (!going || now.merit >= 1 || ++since_best > kLiftPatience || done >= schedule.lift.steps) break;
+    if (!going || now.merit >= 1 || ++since_best > tuning_.lift_patience || done >= schedule.lift.steps) break;
     if (const std::vector<QualityPatch> patches = next_patches(now); !patches.empty()) {
       QualitySchedule of_patch = schedule;
       of_patch.stages.clear();
-      of_patch.far_margin = kLateFarMargin;
+      of_patch.far_margin = tuning_.late_far_margin;
       going = run_patches(of_patch, patches, "lift", x);
       continue;
     }
     if (pass > 0) break;
     QualityStage stage = schedule.lift;
-    stage.steps = kLiftRoundSteps;
+    stage.steps = tuning_.lift_round_steps;
     going = run_stage(stage,
-                      formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kLiftRoundSteps + 1,
-                                now.cells.poor.size(), schedule.goal),
+                      formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(),
+                                done / tuning_.lift_round_steps + 1, now.cells.poor.size(), schedule.goal),
                       true, x);
   }
   if (surface_) surface_->weigh(factors_);
@@ -395,7 +384,7 @@ bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runn
   runner_ = &runner;
   record_ = record;
   report_ = &report;
-  damping_ = kFirstDamping;
+  damping_ = tuning_.first_damping;
   energy_->reset_emphasis();
   for (const QualityStage& stage : schedule.stages)
     if (!run_stage(

@@ -9,6 +9,7 @@
 #include "subvol/fit/stages/quality_patches.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/target/target_surface.h"
+#include "subvol/fit/tuning/quality_tuning.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <algorithm>
@@ -67,30 +68,21 @@ struct QualitySchedule {
   void give_surface_more_weight(double factor);
 };
 
-/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
-inline constexpr double kMaxMargin = 0.8;
-
-/// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.
-inline constexpr double kLateFarMargin = 0.9;
-
 /// A schedule of a few steps without a lift, which brings a template near the surface, to find out what lies where.
 QualitySchedule smooth_quality_schedule();
 
 /// Schedules for a template of a few hundred cells or more at the surface's place: its cells are drawn to the surface
 /// first and are lifted then; and for the refinement of a mesh that was fitted so.
 /// goal  least scaled Jacobian wanted, in (0, 1).
-QualitySchedule coarse_quality_schedule(double goal);
-QualitySchedule fine_quality_schedule(double goal);
+QualitySchedule coarse_quality_schedule(double goal, const QualityTuning& tuning = {});
+QualitySchedule fine_quality_schedule(double goal, const QualityTuning& tuning = {});
 
 /// A schedule for a mesh that is not refined afterwards: the stages of the first, the lift of the second of these.
-QualitySchedule single_quality_schedule(double goal);
+QualitySchedule single_quality_schedule(double goal, const QualityTuning& tuning = {});
 
 /// A schedule for a mesh whose surface is where it should be: a lift in which only poor cells exert a force, so that
 /// the surface moves as little as possible.
-QualitySchedule late_quality_schedule(double goal);
-
-/// Share of the pull along the target's tangents and creases.
-inline constexpr double kQualityTangentialWeight = 0.02;
+QualitySchedule late_quality_schedule(double goal, const QualityTuning& tuning = {});
 
 /// The boundary of a mesh as it is compared with the target: sample triangles on its faces.
 struct QualityBoundary {
@@ -115,7 +107,7 @@ class QualityStages {
   /// creases  energy(width) of the creases that follow edges of the target, over the samples; empty: there are none.
   QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes, std::vector<Vec3> fixed,
                 const QualityBoundary& boundary, const TargetSurface& target,
-                const std::function<CreaseEnergy(double width)>& creases = {});
+                const std::function<CreaseEnergy(double width)>& creases = {}, const QualityTuning& tuning = {});
 
   /// A state that the lift reached.
   struct State {
@@ -166,10 +158,11 @@ class QualityStages {
 
   std::unique_ptr<VolumeMesh> patch_mesh_;  ///< of a patch; null: a whole level
   const VolumeMesh* mesh_;
-  double damping_ = kFirstDamping;  ///< for the next stage
-  double mean_length_ = 0;          ///< wanted, of the cells at the boundary
-  double lambda_one_ = 1;           ///< lambda for w_s = 1
-  double step_work_ = 1;            ///< of a step, as a share of one of the whole level
+  QualityTuning tuning_;
+  double damping_ = tuning_.first_damping;  ///< for the next stage
+  double mean_length_ = 0;                  ///< wanted, of the cells at the boundary
+  double lambda_one_ = 1;                   ///< lambda for w_s = 1
+  double step_work_ = 1;                    ///< of a step, as a share of one of the whole level
   std::unique_ptr<FitProblem> problem_;
   QualityEnergy* energy_ = nullptr;  ///< owned by the problem, as is the next
   ClosestPointEnergy* surface_ = nullptr;

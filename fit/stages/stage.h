@@ -3,11 +3,6 @@
 
 namespace subvol::internal {
 
-/// Lambda of the first stages. It is low, because stiff cells round the template before it reaches the target.
-inline constexpr double kCoarseLambda = 0.05;
-/// Weights of tangential distances, as shares of that of normal ones, far from the target and close to it.
-inline constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
-
 /// Settings of one minimization: its weights and its stop tests.
 struct Stage {
   double lambda, tangential_weight;

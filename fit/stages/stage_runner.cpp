@@ -44,6 +44,8 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.cg_tolerance = stage.linear_tolerance;
   minimizer.hessian_life = stage.hessian_life;
   minimizer.accelerates = stage.accelerates;
+  minimizer.damping = tuning_.quality;
+  minimizer.most_stiffenings = tuning_.curved.most_stiffenings;
   if (stage.longest_move > 0) minimizer.cg_tolerance = kLeastSquaresTolerance;
   int iteration = 0;
   minimizer.ended = [this] { return is_to_end(); };

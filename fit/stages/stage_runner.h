@@ -9,6 +9,7 @@
 #include "subvol/fit/stages/stage.h"
 #include "subvol/fit/stages/stage_log.h"
 #include "subvol/fit/stages/work_share.h"
+#include "subvol/fit/tuning/tuning.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <chrono>
@@ -27,8 +28,10 @@ namespace subvol::internal {
 /// Runs the minimizations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:
-  explicit StageRunner(SolveControl control, SolverKind solver = SolverKind::newton)
-      : control_(std::move(control)), solver_(solver) {}
+  explicit StageRunner(SolveControl control, SolverKind solver = SolverKind::newton, const Tuning& tuning = {})
+      : control_(std::move(control)), solver_(solver), tuning_(tuning) {}
+
+  const Tuning& tuning() const { return tuning_; }
 
   /// Returns a runner with the same limits, callbacks, clock and share of work, but without the log.
   StageRunner without_log() const {
@@ -79,6 +82,7 @@ class StageRunner {
 
   SolveControl control_;
   SolverKind solver_;
+  Tuning tuning_;
   Clock::time_point start_ = Clock::now();
   std::shared_ptr<WorkShare> work_ = std::make_shared<WorkShare>();  ///< never null; the same one in all copies
 };

@@ -22,9 +22,8 @@ void StagedFit::keep_state() {
   if (keep_states_) states_.push_back({states_.empty() ? "template" : report().last_kept_stage()->name, unknowns()});
 }
 
-bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t& pairs) {
-  constexpr double kUnfoldingFactor = 4;  // on lambda: 0.005 becomes 0.02 and 0.08 (docs/fitting.md, "The schedule")
-  for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kUnfoldingFactor) {
+bool StagedFit::unfold(const FitSnapshot& start, double factor, double most_lambda, std::size_t& pairs) {
+  for (double lambda = factor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= factor) {
     FitSnapshot softer = snapshot();
     const std::optional<std::size_t> pairs_now = or_back(softer, [&] {
       unknowns() = start.x;

@@ -55,10 +55,10 @@ class StagedFit {
   }
   /// If states are kept, records the current state under the name of the stage that it came from.
   void keep_state();
-  /// Repeats the last stage from `start` with increasing weight on the cells' shape, up to most_lambda, while `pairs`
-  /// (in/out) of triangles intersect: thin walls that meet in a soft fit stay apart in a stiffer one. A repetition is
-  /// kept if at most half of the pairs remain. Returns false if the fit must end.
-  bool unfold(const FitSnapshot& start, double most_lambda, std::size_t& pairs);
+  /// Repeats the last stage from `start` with increasing weight on the cells' shape, times `factor` (> 1) each time, up
+  /// to most_lambda, while `pairs` (in/out) of triangles intersect: thin walls that meet in a soft fit stay apart in a
+  /// stiffer one. A repetition is kept if at most half of the pairs remain. Returns false if the fit must end.
+  bool unfold(const FitSnapshot& start, double factor, double most_lambda, std::size_t& pairs);
 
   std::vector<FitState> states_;  ///< states of the current attempt, numbered like the degrees of freedom
   double lambda_ = 0;             ///< lambda of the last stage

@@ -18,9 +18,6 @@
 
 namespace subvol::internal {
 
-/// Approximate least number of samples of a target.
-inline constexpr std::size_t kLeastTargetSamples = 20000;
-
 /// The surface that a fit approximates, in normalized coordinates: lengths are shares of the target's diagonal.
 struct FitTarget {
   Normalization normalization;
@@ -57,8 +54,7 @@ struct FitTarget {
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
   /// surface that belong to a neighboring facet. A cloud keeps its points.
   /// least  approximate least number of samples; every triangle has at least one, unless that makes more than `most`.
-  void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples,
-              std::size_t most = std::numeric_limits<std::size_t>::max());
+  void sample(std::size_t num_samples, std::size_t least, std::size_t most = std::numeric_limits<std::size_t>::max());
 
   /// Returns the symmetric distances to another surface; for a cloud, those of its points to the surface.
   /// extremes  as in `SurfaceDistanceOptions`.

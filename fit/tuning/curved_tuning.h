@@ -26,6 +26,10 @@ struct CurvedTuning {
   /// emphasis k, which is then doubled, and the scaled Jacobian from which on a point gets none.
   int most_points_per_direction = 25;
   double first_emphasis = 4, fair_shape = 0.6;
+  /// Factor on the stiffness of points that block a step, and the largest number of times that one step may stiffen
+  /// them.
+  double stiffening_factor = 10;
+  int most_stiffenings = 5;
   /// A place is far if its distance exceeds this many times the mean and this percentage, a tenth of the largest
   /// distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure.
   double far_share = 8, near_percent = 0.05;

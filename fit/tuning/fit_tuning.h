@@ -48,10 +48,6 @@ struct FitTuning {
   /// Continuation: factor on the gain of t until a step is feasible, the least gain that counts, and the share of the
   /// rest below which the gain is slow, so that lambda rises.
   double back_off = 0.6, least_progress = 1e-3, slow_share = 0.25;
-  /// Factor on the stiffness of cells that block a step, and the largest number of times that one step may stiffen
-  /// them.
-  double stiffening_factor = 10;
-  int most_stiffenings = 5;
 };
 
 }  // namespace subvol

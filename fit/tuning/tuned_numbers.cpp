@@ -57,8 +57,6 @@ constexpr Member<FitTuning> kFitNumbers[] = {
     {"back_off", &FitTuning::back_off},
     {"least_progress", &FitTuning::least_progress},
     {"slow_share", &FitTuning::slow_share},
-    {"stiffening_factor", &FitTuning::stiffening_factor},
-    {"most_stiffenings", &FitTuning::most_stiffenings},
 };
 
 constexpr Member<CurvedTuning> kCurvedNumbers[] = {
@@ -76,6 +74,8 @@ constexpr Member<CurvedTuning> kCurvedNumbers[] = {
     {"most_points_per_direction", &CurvedTuning::most_points_per_direction},
     {"first_emphasis", &CurvedTuning::first_emphasis},
     {"fair_shape", &CurvedTuning::fair_shape},
+    {"stiffening_factor", &CurvedTuning::stiffening_factor},
+    {"most_stiffenings", &CurvedTuning::most_stiffenings},
     {"far_share", &CurvedTuning::far_share},
     {"near_percent", &CurvedTuning::near_percent},
     {"most_draws", &CurvedTuning::most_draws},

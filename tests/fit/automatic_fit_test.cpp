@@ -72,11 +72,13 @@ TEST_CASE("A result of another volume is far off, however near it is") {
   result.trials[0].solid_volume_percent = 8;
   internal::mark_if_far_off(result, {}, "edges");
   CHECK(result.report.stop_reason == StopReason::tolerance_missed);
-  CHECK_FALSE(internal::is_good_enough([&] {
-    trial.solid_volume_percent = 8;
-    trial.merit = internal::merit_of(trial, {});
-    return trial;
-  }()));
+  CHECK_FALSE(internal::is_good_enough(
+      [&] {
+        trial.solid_volume_percent = 8;
+        trial.merit = internal::merit_of(trial, {});
+        return trial;
+      }(),
+      {}));
 }
 
 TEST_CASE("All oblique faces of a part get pads, also where five of them meet at a corner", "[slow]") {

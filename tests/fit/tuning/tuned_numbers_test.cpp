@@ -60,6 +60,6 @@ TEST_CASE("Unknown tuned numbers and values out of range are refused", "[tuning]
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double bad : {0.0, -1.0, infinity, -infinity, std::nan("")}) {
     CHECK(!message_of("fitting.back_off", bad).empty());
-    CHECK(!message_of("fitting.most_stiffenings", bad).empty());
+    CHECK(!message_of("curved.most_stiffenings", bad).empty());
   }
 }
