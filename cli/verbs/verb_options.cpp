@@ -36,8 +36,8 @@ constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimi
 std::string set_number(Tuning& tuning, const std::string& word) {
   const std::size_t equals = word.find('=');
   const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-  constexpr double kMostNumber = 1e12;  // tuned numbers have their own ranges
-  if (!is_number_in(value, -kMostNumber, kMostNumber)) return "must be NAME=VALUE with a number, not " + word;
+  constexpr double kMostTunedNumber = 1e12;  // tuned numbers have their own ranges
+  if (!is_number_in(value, -kMostTunedNumber, kMostTunedNumber)) return "must be NAME=VALUE with a number, not " + word;
   try {
     set_tuned_number(tuning, word.substr(0, equals), std::stod(value));
   } catch (const InputError& error) {

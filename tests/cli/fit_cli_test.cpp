@@ -170,6 +170,35 @@ TEST_CASE("A fit is the same bits for one thread and for two", "[cli][slow]") {
   CHECK(content_of(place / "one.obj") == content_of(place / "two.obj"));
 }
 
+TEST_CASE("Tuned numbers can be set for an experiment", "[cli]") {
+  const Workplace place;
+  const std::string fit = kFit + "--levels 1 -o out.mesh --report report.json --force ";
+  REQUIRE(place.run(fit + "--tune fitting.coarse_lambda=0.02 --tune quality.max_margin=0.9").status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report.at("options").at("tune") ==
+        nlohmann::json::array({"fitting.coarse_lambda=0.02", "quality.max_margin=0.9"}));
+  CHECK(report.at("stages").at(0).at("lambda") == 0.02);
+  REQUIRE(place.run(kFit + "--order 2 -o out.vtu --report report.json --force --tune curved.most_steps=1").status == 0);
+  CHECK(place.json("report.json").at("stages").back().at("iterations") == 1);
+  REQUIRE(place
+              .run("optimize template.mesh -o best.mesh --report report.json --tune optimize.first_round_steps=1 "
+                   "--tune optimize.most_rounds=1")
+              .status == 0);
+  for (const auto& stage : place.json("report.json").at("stages"))
+    CHECK(stage.at("name").get<std::string>().find("round 2") == std::string::npos);
+  const auto refused = [&](const char* number, const char* reason) {
+    const Run run = place.run(kFit + "-o no.mesh --tune " + number);
+    INFO(run.err);
+    CHECK(run.status == 2);
+    CHECK(run.err.find(reason) != std::string::npos);
+    CHECK(!place.has("no.mesh"));
+  };
+  refused("fitting.coarse=0.02", "there is no tuned number 'fitting.coarse'");
+  refused("fitting.coarse_lambda=2", "it must be between 0 and 1");
+  refused("fitting.coarse_lambda=nan", "must be NAME=VALUE with a number");
+  refused("fitting.coarse_lambda", "must be NAME=VALUE with a number");
+}
+
 TEST_CASE("Points are fitted and checked one way, and what makes no sense with them is refused", "[cli][slow]") {
   const auto sample = subvol::samples::ball_sample();
   const Workplace place(sample);

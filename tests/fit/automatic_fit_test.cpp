@@ -296,7 +296,7 @@ TEST_CASE("A trial that loses a feature is never good enough") {
   trial.self_intersections = 0;
   const auto is_good = [&] {
     trial.merit = internal::merit_of(trial, options);
-    return internal::is_good_enough(trial);
+    return internal::is_good_enough(trial, options.tuning.automatic);
   };
   trial.feature_miss = FeatureMiss{.share = 1.1};
   CHECK(is_good());  // the feature is small: it may be noise of the triangulation

@@ -159,6 +159,25 @@ class Fits(InFolder):
             subvol.fit(BALL[0], inside_out)
 
 
+class Tuning(InFolder):
+    """Tuned numbers, for experiments."""
+
+    def test_numbers_are_set_by_name(self):
+        tune = {"fitting.coarse_lambda": 0.02}
+        fit = subvol.fit(*BALL, levels=1, tune=tune)
+        self.assertEqual(fit.report["stages"][0]["lambda"], 0.02)
+        self.assertEqual(fit.report["options"]["tune"], tune)
+
+    def test_unknown_names_and_values_out_of_range_are_refused(self):
+        for tune, reason in (({"fitting.coarse": 0.02}, "there is no tuned number 'fitting.coarse'"),
+                             ({"fitting.coarse_lambda": 2}, "must be between 0 and 1")):
+            with self.assertRaisesRegex(subvol.InputError, reason):
+                subvol.fit(*BALL, levels=1, tune=tune)
+        for tune in (3, {3: 0.5}, {"fitting.coarse_lambda": "low"}):
+            with self.assertRaises(TypeError):
+                subvol.fit(*BALL, levels=1, tune=tune)
+
+
 class Points(InFolder):
     """Clouds as targets."""
 

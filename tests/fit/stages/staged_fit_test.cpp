@@ -21,11 +21,11 @@ class FoldedFit : public StagedFit {
   explicit FoldedFit(std::size_t (*pairs_at)(double)) : StagedFit(true), pairs_at_(pairs_at), x_(1, Vec3(7, 0, 0)) {}
 
   bool unfold(double most_lambda) {
-    constexpr double kFactor = 4;
+    constexpr double kUnfoldingFactor = 4;
     const FitSnapshot start = snapshot();
     run_final_stage(0.01);
     pairs = intersecting_pairs().value();
-    return StagedFit::unfold(start, kFactor, most_lambda, pairs);
+    return StagedFit::unfold(start, kUnfoldingFactor, most_lambda, pairs);
   }
   double x() const { return x_[0][0]; }
   double lambda() const { return lambda_; }
