@@ -179,11 +179,13 @@ TEST_CASE("Tuned numbers can be set for an experiment", "[cli]") {
         nlohmann::json::array({"fitting.coarse_lambda=0.02", "quality.max_margin=0.9"}));
   CHECK(report.at("stages").at(0).at("lambda") == 0.02);
   REQUIRE(place.run(kFit + "--order 2 -o out.vtu --report report.json --force --tune curved.most_steps=1").status == 0);
-  CHECK(place.json("report.json").at("stages").back().at("iterations") == 1);
-  REQUIRE(place
-              .run("optimize template.mesh -o best.mesh --report report.json --tune optimize.first_round_steps=1 "
-                   "--tune optimize.most_rounds=1")
-              .status == 0);
+  for (const auto& stage : place.json("report.json").at("stages"))
+    if (stage.at("name") == "order 2, lambda 0.05, tangential weight 0.003") CHECK(stage.at("iterations") == 1);
+  REQUIRE(
+      place
+          .run("optimize template.mesh -o best.mesh --report report.json --force --tune optimize.first_round_steps=1 "
+               "--tune optimize.most_rounds=1")
+          .status == 0);
   for (const auto& stage : place.json("report.json").at("stages"))
     CHECK(stage.at("name").get<std::string>().find("round 2") == std::string::npos);
   const auto refused = [&](const char* number, const char* reason) {
