@@ -35,9 +35,10 @@ std::vector<std::string> linear_cells_warnings(const MeshCheck& check);
 /// with these.
 struct PolynomialCells {
   std::string file;
-  double distance_percent = 0;  ///< upper bound of the distance from the curved cells, in percent of the diagonal of
-                                ///< the vertices' box
-  bool is_close = false;        ///< true if that is within --map-tolerance
+  /// Distance from the curved cells, in percent of the diagonal of the vertices' box: an upper bound, which may be
+  /// hundreds of times too large, and the largest one at points on a grid.
+  double distance_percent = 0, sampled_percent = 0;
+  bool is_close = false;  ///< true if that is within --map-tolerance
   MeshCheck check;
 };
 /// Checks such cells of all outputs, with check(polynomials) for each.
