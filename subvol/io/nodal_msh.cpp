@@ -80,36 +80,22 @@ struct Element {
   std::size_t first_node;  ///< in the list of all elements' nodes
 };
 
-class MshParser {
+constexpr std::int64_t kMostNumber = std::numeric_limits<int>::max();  // of a group, an entity or a reference
+
+/// The numbers of a file in ASCII or binary, and the ends of its sections.
+class MshStream {
  public:
-  MshParser(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
+  MshStream(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
 
-  NodalMesh parse() {
-    read_format();
-    while (const auto word = scan_.next()) {
-      const std::string section(*word);
-      if (section == "$Nodes")
-        read_nodes();
-      else if (section == "$Elements")
-        read_elements();
-      else if (section == "$PhysicalNames")
-        read_physical_names();
-      else if (section == "$Entities")
-        read_entities();
-      else if (section == "$PartitionedEntities")
-        skip_partitions();
-      else if (section.starts_with("$"))
-        skip_section(section);
-      else
-        scan_.fail("expected a section such as $Nodes, found " + in_quotes(*word));
-    }
-    if (!has_nodes_) scan_.fail("the file ends without $Nodes");
-    if (!has_elements_) scan_.fail("the file ends without $Elements");
-    build();
-    return std::move(mesh_);
-  }
+  TextScanner& scan() { return scan_; }
+  const TextScanner& scan() const { return scan_; }
+  /// True for versions 2; for version 4.1, not 4.0.
+  bool is_old() const { return is_old_; }
+  bool is_4_1() const { return is_4_1_; }
+  bool is_binary() const { return binary_; }
+  /// The type of counts, and of tags in version 4.1.
+  ValueType size_type() const { return size_type_; }
 
- private:
   void read_format() {
     const std::string_view first = scan_.word("$MeshFormat");
     if (first == "$NOD") scan_.fail("version 1 of Gmsh's format, expected 2.2, 4.0 or 4.1");
@@ -152,11 +138,6 @@ class MshParser {
     scan_.fail("the file ends within " + section);
   }
 
-  void skip_partitions() {
-    skip_section("$PartitionedEntities");
-    mesh_.warnings.push_back("the file is partitioned: physical groups of partitions are not read");
-  }
-
   /// Goes to where the binary part of a section begins.
   void begin_section() {
     if (binary_) scan_.line();
@@ -183,6 +164,73 @@ class MshParser {
     return static_cast<std::size_t>(n);
   }
 
+  /// Boxes of entities do not matter, and may be infinite.
+  void read_box_coordinate() {
+    if (binary_)
+      scan_.bytes(8, "a coordinate");
+    else
+      scan_.word("a coordinate");
+  }
+
+  Vec3 read_position() {
+    Vec3 p;
+    for (int k = 0; k < 3; ++k) p[k] = read(kFloat64, "a coordinate");
+    return p;
+  }
+
+ private:
+  TextScanner scan_;
+  bool is_old_ = false, is_4_1_ = false, binary_ = false;
+  std::endian endian_ = std::endian::little;
+  ValueType size_type_ = kUInt64;
+};
+
+/// What a file holds, as its sections say it.
+struct MshContent {
+  NodalMesh mesh;                                                    ///< nodes and warnings
+  std::unordered_map<std::int64_t, Index> numbers;                   ///< of nodes by their tags
+  std::array<std::map<int, std::string>, 4> names;                   ///< of physical groups, by dimension
+  std::array<std::map<std::int64_t, std::vector<int>>, 4> physical;  ///< groups of entities
+  std::vector<Element> elements;
+  std::vector<std::int64_t> element_nodes;
+  std::size_t num_skipped = 0, num_more_groups = 0;
+};
+
+/// Reads the sections of a file.
+class MshParser {
+ public:
+  explicit MshParser(MshStream& stream) : stream_(stream), scan_(stream.scan()) {}
+
+  MshContent parse() {
+    stream_.read_format();
+    while (const auto word = scan_.next()) {
+      const std::string section(*word);
+      if (section == "$Nodes")
+        read_nodes();
+      else if (section == "$Elements")
+        read_elements();
+      else if (section == "$PhysicalNames")
+        read_physical_names();
+      else if (section == "$Entities")
+        read_entities();
+      else if (section == "$PartitionedEntities")
+        skip_partitions();
+      else if (section.starts_with("$"))
+        stream_.skip_section(section);
+      else
+        scan_.fail("expected a section such as $Nodes, found " + in_quotes(*word));
+    }
+    if (!has_nodes_) scan_.fail("the file ends without $Nodes");
+    if (!has_elements_) scan_.fail("the file ends without $Elements");
+    return std::move(content_);
+  }
+
+ private:
+  void skip_partitions() {
+    stream_.skip_section("$PartitionedEntities");
+    content_.mesh.warnings.push_back("the file is partitioned: physical groups of partitions are not read");
+  }
+
   void read_physical_names() {
     const std::size_t n = scan_.count("the number of names", 3);
     for (std::size_t i = 0; i < n; ++i) {
@@ -193,90 +241,78 @@ class MshParser {
       if (begin == std::string_view::npos || end <= begin) scan_.fail("expected a name in double quotes");
       if (dim < 0 || dim > 3 || std::abs(number) > std::numeric_limits<int>::max())
         scan_.fail("expected a dimension from 0 to 3 and a number of 32 bits");
-      names_[static_cast<std::size_t>(dim)][static_cast<int>(number)] =
+      content_.names[static_cast<std::size_t>(dim)][static_cast<int>(number)] =
           std::string(rest->substr(begin + 1, end - begin - 1));
     }
-    end_section("$PhysicalNames");
+    stream_.end_section("$PhysicalNames");
   }
 
   /// Reads the physical groups of the parts of the geometry.
   void read_entities() {
-    begin_section();
+    stream_.begin_section();
     std::array<std::size_t, 4> counts{};
-    for (std::size_t& n : counts) n = read_size("a number of entities", 1);
+    for (std::size_t& n : counts) n = stream_.read_size("a number of entities", 1);
     for (std::size_t dim = 0; dim < 4; ++dim)
       for (std::size_t i = 0; i < counts[dim]; ++i) {
-        const std::int64_t tag = read_int("the tag of an entity");
-        const int num_coordinates = dim == 0 && is_4_1_ ? 3 : 6;
-        for (int k = 0; k < num_coordinates; ++k) read_box_coordinate();
-        const std::size_t groups = read_size("the number of physical groups", 1);
+        const std::int64_t tag = stream_.read_int("the tag of an entity");
+        const int num_coordinates = dim == 0 && stream_.is_4_1() ? 3 : 6;
+        for (int k = 0; k < num_coordinates; ++k) stream_.read_box_coordinate();
+        const std::size_t groups = stream_.read_size("the number of physical groups", 1);
         for (std::size_t k = 0; k < groups; ++k) {
-          const std::int64_t group = std::abs(read_int("a physical group"));
-          physical_[dim][tag].push_back(static_cast<int>(std::min<std::int64_t>(group, kMostNumber)));
-          num_more_groups_ += k > 0 && dim == 3;
+          const std::int64_t group = std::abs(stream_.read_int("a physical group"));
+          content_.physical[dim][tag].push_back(static_cast<int>(std::min<std::int64_t>(group, kMostNumber)));
+          content_.num_more_groups += k > 0 && dim == 3;
         }
         if (dim == 0) continue;
-        const std::size_t borders = read_size("the number of bounding entities", 1);
-        for (std::size_t k = 0; k < borders; ++k) read_int("a bounding entity");
+        const std::size_t borders = stream_.read_size("the number of bounding entities", 1);
+        for (std::size_t k = 0; k < borders; ++k) stream_.read_int("a bounding entity");
       }
-    end_section("$Entities");
-  }
-
-  /// Boxes of entities do not matter, and may be infinite.
-  void read_box_coordinate() {
-    if (binary_)
-      scan_.bytes(8, "a coordinate");
-    else
-      scan_.word("a coordinate");
+    stream_.end_section("$Entities");
   }
 
   void add_node(std::int64_t tag, const Vec3& position) {
-    if (!numbers_.try_emplace(tag, static_cast<Index>(mesh_.positions.size())).second)
+    if (!content_.numbers.try_emplace(tag, static_cast<Index>(content_.mesh.positions.size())).second)
       scan_.fail("a second node " + std::to_string(tag));
-    mesh_.positions.push_back(position);
-  }
-
-  Vec3 read_position() {
-    Vec3 p;
-    for (int k = 0; k < 3; ++k) p[k] = read(kFloat64, "a coordinate");
-    return p;
+    content_.mesh.positions.push_back(position);
   }
 
   void read_nodes() {
     if (has_nodes_) scan_.fail("a second section $Nodes");
     has_nodes_ = true;
-    if (is_old_) {
-      const std::size_t n = scan_.count("the number of nodes", binary_ ? 1 : 4);
-      begin_section();
+    if (stream_.is_old()) {
+      const std::size_t n = scan_.count("the number of nodes", stream_.is_binary() ? 1 : 4);
+      stream_.begin_section();
       for (std::size_t i = 0; i < n; ++i) {
-        const std::int64_t tag = read_int("the number of a node");
-        add_node(tag, read_position());
+        const std::int64_t tag = stream_.read_int("the number of a node");
+        add_node(tag, stream_.read_position());
       }
-      return end_section("$Nodes");
+      return stream_.end_section("$Nodes");
     }
-    begin_section();
-    const std::size_t num_blocks = read_size("the number of blocks", 4);
-    read_size("the number of nodes", 3);
-    if (is_4_1_) read(size_type_, "the smallest tag"), read(size_type_, "the largest tag");
+    stream_.begin_section();
+    const std::size_t num_blocks = stream_.read_size("the number of blocks", 4);
+    stream_.read_size("the number of nodes", 3);
+    if (stream_.is_4_1())
+      stream_.read(stream_.size_type(), "the smallest tag"), stream_.read(stream_.size_type(), "the largest tag");
     std::vector<std::int64_t> tags;
     for (std::size_t block = 0; block < num_blocks; ++block) {
-      const std::int64_t first = read_int("a dimension or tag"), second = read_int("a dimension or tag");
-      const std::int64_t dim = is_4_1_ ? first : second;
-      const std::int64_t parametric = read_int("0 or 1");
+      const std::int64_t first = stream_.read_int("a dimension or tag"),
+                         second = stream_.read_int("a dimension or tag");
+      const std::int64_t dim = stream_.is_4_1() ? first : second;
+      const std::int64_t parametric = stream_.read_int("0 or 1");
       if (dim < 0 || dim > 3 || parametric < 0 || parametric > 1)
         scan_.fail("expected a dimension from 0 to 3, and 0 or 1 for parametric coordinates");
-      const std::size_t n = read_size("the number of nodes of a block", is_4_1_ ? 1 : 4);
+      const std::size_t n = stream_.read_size("the number of nodes of a block", stream_.is_4_1() ? 1 : 4);
       tags.clear();
-      if (is_4_1_)
-        for (std::size_t i = 0; i < n; ++i) tags.push_back(read_tag("the tag of a node"));
+      if (stream_.is_4_1())
+        for (std::size_t i = 0; i < n; ++i) tags.push_back(stream_.read_tag("the tag of a node"));
       for (std::size_t i = 0; i < n; ++i) {
-        const std::int64_t tag = is_4_1_ ? tags[i] : read_tag("the tag of a node");
-        const Vec3 position = read_position();
-        for (int k = 0; k < parametric * dim; ++k) read_box_coordinate();
+        const std::int64_t tag = stream_.is_4_1() ? tags[i] : stream_.read_tag("the tag of a node");
+        const Vec3 position = stream_.read_position();
+        for (int k = 0; k < parametric * dim; ++k) stream_.read_box_coordinate();
         add_node(tag, position);
       }
     }
-    end_section("$Nodes");
+    stream_.end_section("$Nodes");
   }
 
   const MshType& type_of(std::int64_t type) {
@@ -295,77 +331,93 @@ class MshParser {
   void add_element(const MshType& type, int physical, std::int64_t entity, const std::vector<int>* more = nullptr) {
     const bool wanted = dimension(type.shape) >= 2;
     if (wanted)
-      elements_.push_back({&type, physical, more, entity, scan_.word_line(), element_nodes_.size()});
+      content_.elements.push_back({&type, physical, more, entity, scan_.word_line(), content_.element_nodes.size()});
     else
-      ++num_skipped_;
+      ++content_.num_skipped;
     for (int i = 0; i < type.size; ++i) {
-      const std::int64_t node = read_tag("a node of an element");
-      if (wanted) element_nodes_.push_back(node);
+      const std::int64_t node = stream_.read_tag("a node of an element");
+      if (wanted) content_.element_nodes.push_back(node);
     }
   }
 
   void read_elements() {
     if (has_elements_) scan_.fail("a second section $Elements");
     has_elements_ = true;
-    if (is_old_) return read_old_elements();
-    begin_section();
-    const std::size_t num_blocks = read_size("the number of blocks", 4);
-    read_size("the number of elements", 2);
-    if (is_4_1_) read(size_type_, "the smallest tag"), read(size_type_, "the largest tag");
+    if (stream_.is_old()) return read_old_elements();
+    stream_.begin_section();
+    const std::size_t num_blocks = stream_.read_size("the number of blocks", 4);
+    stream_.read_size("the number of elements", 2);
+    if (stream_.is_4_1())
+      stream_.read(stream_.size_type(), "the smallest tag"), stream_.read(stream_.size_type(), "the largest tag");
     for (std::size_t block = 0; block < num_blocks; ++block) {
-      const std::int64_t first = read_int("a dimension or tag"), second = read_int("a dimension or tag");
-      const std::int64_t entity = is_4_1_ ? second : first;
-      const MshType& type = type_of(read_int("a type of elements"));
-      const std::size_t n = read_size("the number of elements of a block", static_cast<std::size_t>(type.size) + 1);
-      const auto& groups = physical_[static_cast<std::size_t>(dimension(type.shape))];
+      const std::int64_t first = stream_.read_int("a dimension or tag"),
+                         second = stream_.read_int("a dimension or tag");
+      const std::int64_t entity = stream_.is_4_1() ? second : first;
+      const MshType& type = type_of(stream_.read_int("a type of elements"));
+      const std::size_t n =
+          stream_.read_size("the number of elements of a block", static_cast<std::size_t>(type.size) + 1);
+      const auto& groups = content_.physical[static_cast<std::size_t>(dimension(type.shape))];
       const auto group = groups.find(entity);
       for (std::size_t i = 0; i < n; ++i) {
-        read_tag("the tag of an element");
+        stream_.read_tag("the tag of an element");
         const bool in_none = group == groups.end() || group->second.empty();
         add_element(type, in_none ? 0 : group->second[0], entity, in_none ? nullptr : &group->second);
       }
     }
-    end_section("$Elements");
+    stream_.end_section("$Elements");
   }
 
   void read_old_elements() {
-    const std::size_t n = scan_.count("the number of elements", binary_ ? 1 : 4);
-    begin_section();
+    const std::size_t n = scan_.count("the number of elements", stream_.is_binary() ? 1 : 4);
+    stream_.begin_section();
     for (std::size_t i = 0; i < n;) {
-      if (!binary_) read_int("the number of an element");
-      const MshType& type = type_of(read_int("the type of an element"));
-      const std::size_t group = binary_ ? read_size("a number of elements", 1, true) : 1;
+      if (!stream_.is_binary()) stream_.read_int("the number of an element");
+      const MshType& type = type_of(stream_.read_int("the type of an element"));
+      const std::size_t group = stream_.is_binary() ? stream_.read_size("a number of elements", 1, true) : 1;
       if (group == 0 || group > n - i) scan_.fail("expected a number of elements up to that of the section");
-      const std::size_t num_tags = read_size("the number of tags", 1, true);
+      const std::size_t num_tags = stream_.read_size("the number of tags", 1, true);
       for (std::size_t k = 0; k < group; ++k, ++i) {
-        if (binary_) read_int("the number of an element");
+        if (stream_.is_binary()) stream_.read_int("the number of an element");
         std::int64_t physical = 0, entity = 0;
         for (std::size_t t = 0; t < num_tags; ++t) {
-          const std::int64_t tag = read_int("a tag");
+          const std::int64_t tag = stream_.read_int("a tag");
           if (t == 0) physical = std::min<std::int64_t>(std::abs(tag), kMostNumber);
           if (t == 1) entity = tag;
         }
         add_element(type, static_cast<int>(physical), entity);
       }
     }
-    end_section("$Elements");
+    stream_.end_section("$Elements");
   }
 
-  // --- Building the mesh ---------------------------------------------------------------------------------------------
+  MshStream& stream_;
+  TextScanner& scan_;
+  MshContent content_;
+  bool has_nodes_ = false, has_elements_ = false;
+};
 
-  void build() {
+/// Makes a mesh of the elements that were read.
+class MshBuilder {
+ public:
+  /// stream: names the file in errors.
+  MshBuilder(MshContent content, const MshStream& stream) : content_(std::move(content)), stream_(stream) {}
+
+  NodalMesh build() {
     const auto is_cell = [](const Element& element) { return dimension(element.type->shape) == 3; };
-    const bool has_groups = std::any_of(elements_.begin(), elements_.end(), [&](const Element& element) {
-      return is_cell(element) && element.physical != 0;
-    });
-    if (std::none_of(elements_.begin(), elements_.end(), is_cell)) return build_shells();
+    const bool has_groups =
+        std::any_of(content_.elements.begin(), content_.elements.end(),
+                    [&](const Element& element) { return is_cell(element) && element.physical != 0; });
+    if (std::none_of(content_.elements.begin(), content_.elements.end(), is_cell)) {
+      build_shells();
+      return std::move(mesh_);
+    }
     find_own_references();
     NodalCells cells(mesh_);
     GroupList faces;
     std::vector<Index> nodes;
-    for (const Element& element : elements_) {
+    for (const Element& element : content_.elements) {
       if (!is_cell(element) && element.physical == 0) {
-        ++num_skipped_;
+        ++content_.num_skipped;
         continue;
       }
       take_nodes(element, nodes);
@@ -384,27 +436,31 @@ class MshParser {
     }
     mesh_.face_groups.groups = faces.take();
     for (Group& group : mesh_.face_groups.groups)
-      if (const auto name = names_[2].find(group.number); name != names_[2].end()) group.name = name->second;
+      if (const auto name = content_.names[2].find(group.number); name != content_.names[2].end())
+        group.name = name->second;
     if (!has_groups && std::all_of(mesh_.references.begin(), mesh_.references.end(),
                                    [&](int reference) { return reference == mesh_.references.front(); }))
       mesh_.references.clear();
     name_regions();
-    if (num_more_groups_ > 0)
+    if (content_.num_more_groups > 0)
       mesh_.warnings.push_back(
-          std::to_string(num_more_groups_) +
+          std::to_string(content_.num_more_groups) +
           " physical groups of volumes are not used: each volume has a physical group before them");
-    if (num_skipped_ > 0)
-      mesh_.warnings.push_back(std::to_string(num_skipped_) +
+    if (content_.num_skipped > 0)
+      mesh_.warnings.push_back(std::to_string(content_.num_skipped) +
                                " elements of lower dimension that are no face of a physical group are skipped");
+    return std::move(mesh_);
   }
 
+ private:
   void take_nodes(const Element& element, std::vector<Index>& nodes) const {
     nodes.clear();
     for (int i = 0; i < element.type->size; ++i) {
-      const std::int64_t tag = element_nodes_[element.first_node + static_cast<std::size_t>(i)];
-      const auto found = numbers_.find(tag);
-      if (found == numbers_.end())
-        scan_.fail("an element names node " + std::to_string(tag) + ", which the file does not have", element.line);
+      const std::int64_t tag = content_.element_nodes[element.first_node + static_cast<std::size_t>(i)];
+      const auto found = content_.numbers.find(tag);
+      if (found == content_.numbers.end())
+        stream_.scan().fail("an element names node " + std::to_string(tag) + ", which the file does not have",
+                            element.line);
       nodes.push_back(found->second);
     }
   }
@@ -412,11 +468,11 @@ class MshParser {
   /// Without cells, the elements of two dimensions are a surface. Its groups are the physical ones; without any, the
   /// surfaces of the geometry.
   void build_shells() {
-    const bool has_groups =
-        std::any_of(elements_.begin(), elements_.end(), [](const Element& element) { return element.physical != 0; });
+    const bool has_groups = std::any_of(content_.elements.begin(), content_.elements.end(),
+                                        [](const Element& element) { return element.physical != 0; });
     GroupList groups;
     std::vector<Index> nodes, of_face;
-    for (const Element& element : elements_) {
+    for (const Element& element : content_.elements) {
       take_nodes(element, nodes);
       nodes.resize(element.type->shape == Shape::quad ? 4 : 3);
       mesh_.shells.face_vertices.insert(mesh_.shells.face_vertices.end(), nodes.begin(), nodes.end());
@@ -428,15 +484,15 @@ class MshParser {
     if (!has_groups && groups.groups().size() < 2) return;
     mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
     for (Group& group : mesh_.shells.face_groups.groups)
-      if (const auto name = names_[2].find(group.number); has_groups && name != names_[2].end())
+      if (const auto name = content_.names[2].find(group.number); has_groups && name != content_.names[2].end())
         group.name = name->second;
   }
 
   /// The reference that a group's name stands for, if `write_volume` may have named it.
   std::optional<int> named_reference(int group) const {
     constexpr std::string_view kReferenceNamePrefix = "reference ";
-    const auto name = names_[3].find(group);
-    if (name == names_[3].end() || !name->second.starts_with(kReferenceNamePrefix)) return std::nullopt;
+    const auto name = content_.names[3].find(group);
+    if (name == content_.names[3].end() || !name->second.starts_with(kReferenceNamePrefix)) return std::nullopt;
     const auto reference = parse_integer(std::string_view(name->second).substr(kReferenceNamePrefix.size()));
     if (!reference || std::abs(*reference) > kMostNumber) return std::nullopt;
     return static_cast<int>(*reference);
@@ -446,7 +502,7 @@ class MshParser {
   /// another group, or in the name of another one, since two regions would become one.
   void find_own_references() {
     std::set<int> groups;
-    for (const Element& element : elements_)
+    for (const Element& element : content_.elements)
       if (dimension(element.type->shape) == 3 && element.physical != 0) groups.insert(element.physical);
     std::map<int, int> num_named;
     for (const int group : groups)
@@ -461,25 +517,15 @@ class MshParser {
   }
 
   void name_regions() {
-    for (const auto& [number, name] : names_[3])
+    for (const auto& [number, name] : content_.names[3])
       if (!own_references_.contains(number) && std::ranges::find(mesh_.references, number) != mesh_.references.end())
         mesh_.regions.push_back({name, number, 3});
   }
 
-  static constexpr std::int64_t kMostNumber = std::numeric_limits<int>::max();
-
-  TextScanner scan_;
-  NodalMesh mesh_;
-  bool is_old_ = false, is_4_1_ = false, binary_ = false, has_nodes_ = false, has_elements_ = false;
-  std::endian endian_ = std::endian::little;
-  ValueType size_type_ = kUInt64;
-  std::unordered_map<std::int64_t, Index> numbers_;                   ///< of nodes by their tags
-  std::array<std::map<int, std::string>, 4> names_;                   ///< of physical groups, by dimension
-  std::array<std::map<std::int64_t, std::vector<int>>, 4> physical_;  ///< groups of entities
-  std::map<int, int> own_references_;                                 ///< of groups of cells
-  std::vector<Element> elements_;
-  std::vector<std::int64_t> element_nodes_;
-  std::size_t num_skipped_ = 0, num_more_groups_ = 0;
+  MshContent content_;
+  NodalMesh& mesh_ = content_.mesh;
+  const MshStream& stream_;
+  std::map<int, int> own_references_;  ///< of groups of cells
 };
 
 }  // namespace
@@ -487,7 +533,8 @@ class MshParser {
 bool is_gmsh(std::string_view bytes) { return bytes.starts_with("$MeshFormat"); }
 
 NodalMesh parse_msh(const std::string& name, std::string_view bytes, const std::string&) {
-  return MshParser(name, bytes).parse();
+  MshStream stream(name, bytes);
+  return MshBuilder(MshParser(stream).parse(), stream).build();
 }
 
 }  // namespace subvol::internal
