@@ -63,41 +63,18 @@ constexpr VtkAttribute kSkippedAttributes[] = {
     {"lookup_table", 4, true},
 };
 
-class VtkParser {
+/// The numbers of a file in ASCII or binary.
+class VtkStream {
  public:
-  VtkParser(const std::string& name, std::string_view bytes, const std::string& references)
-      : scan_(name, bytes, TextScanner::Comments::none), name_(name), asked_(references) {}
+  VtkStream(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
 
-  NodalMesh parse() {
-    read_header();
-    while (const auto word = scan_.next()) {
-      const std::string keyword = lower_case(*word);
-      if (keyword == "points")
-        read_points();
-      else if (keyword == "cells")
-        read_cells();
-      else if (keyword == "cell_types")
-        read_cell_types();
-      else if (keyword == "cell_data")
-        read_attributes(num_cells_, true);
-      else if (keyword == "point_data")
-        read_attributes(mesh_.positions.size(), false);
-      else if (keyword == "field")
-        read_field(false);
-      else if (keyword == "metadata")
-        skip_metadata();
-      else
-        scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
-      if (stray_attribute_) break;  // the mesh itself comes before its attributes
-    }
-    if (!has_points_) scan_.fail("the file ends without POINTS");
-    if (!has_cells_) scan_.fail("the file ends without CELLS");
-    if (!has_types_) scan_.fail("the file ends without CELL_TYPES");
-    build_cells();
-    return std::move(mesh_);
-  }
+  TextScanner& scan() { return scan_; }
+  bool is_binary() const { return binary_; }
+  /// First part of the version.
+  int major() const { return major_; }
+  /// True if the nodes of cells have the numbers that they had before version 5.1.
+  bool has_old_numbers() const { return old_numbers_; }
 
- private:
   void read_header() {
     constexpr std::string_view kOpening = "# vtk DataFile Version ";
     const auto first = scan_.line();
@@ -169,79 +146,33 @@ class VtkParser {
     return numbers;
   }
 
-  void read_points() {
-    if (has_points_) scan_.fail("a second section POINTS");
-    has_points_ = true;
-    const std::size_t n = read_count("the number of points");
-    const ValueType type = read_type();
-    if (n > scan_.bytes_left() / 3) scan_.fail("the file ends within the coordinates");
-    mesh_.positions.resize(n);
-    read_values(3 * n, type, "a coordinate", [&](std::size_t i, double value) {
-      if (!std::isfinite(value)) scan_.fail("point " + std::to_string(i / 3) + " has a coordinate that is not finite");
-      mesh_.positions[i / 3][static_cast<Eigen::Index>(i % 3)] = value;
-    });
+  /// METADATA runs to the next empty line.
+  void skip_metadata() {
+    scan_.line();
+    while (const auto line = scan_.line())
+      if (line->find_first_not_of(" \t") == std::string_view::npos) break;
   }
 
-  void read_cells() {
-    if (has_cells_) scan_.fail("a second section CELLS");
-    has_cells_ = true;
-    cells_line_ = scan_.word_line();
-    const std::size_t n = read_count("the number of cells"), size = read_count("the size of CELLS");
-    const auto next = major_ >= 5 ? scan_.peek() : std::nullopt;
-    if (next && lower_case(*next) == "offsets")
-      read_offsets_and_connectivity(n, size);
-    else if (next && binary_)
-      scan_.fail("expected OFFSETS, found " + in_quotes(*next));
-    else
-      split_counted_lists(n, read_whole_numbers(size, kInt32, "cell corners"));
-    num_cells_ = offsets_.size() - 1;
-  }
+ private:
+  TextScanner scan_;
+  int major_ = 0;
+  bool binary_ = false, old_numbers_ = false;
+};
 
-  // Before 5.0, each cell is its number of corners followed by the corners.
-  void split_counted_lists(std::size_t n, const std::vector<std::int64_t>& numbers) {
-    std::size_t at = 0;
-    for (std::size_t c = 0; c < n; ++c) {
-      if (at == numbers.size()) scan_.fail("CELLS has fewer cells than it says", cells_line_);
-      const std::int64_t corners = numbers[at++];
-      if (corners < 0 || static_cast<std::uint64_t>(corners) > numbers.size() - at)
-        scan_.fail(
-            "cell " + std::to_string(c) + " has " + std::to_string(corners) + " corners, beyond the size of CELLS",
-            cells_line_);
-      corners_.insert(corners_.end(), numbers.begin() + at, numbers.begin() + at + corners);
-      at += static_cast<std::size_t>(corners);
-      offsets_.push_back(corners_.size());
-    }
-    if (at != numbers.size()) scan_.fail("the size of CELLS is larger than its cells", cells_line_);
-  }
+/// Reads attributes. Arrays of one whole number per cell are kept: one may become the references.
+class VtkAttributes {
+ public:
+  /// asked: the array that is to become the references; empty: a usual one.
+  VtkAttributes(VtkStream& stream, const std::string& name, const std::string& asked)
+      : stream_(stream), scan_(stream.scan()), name_(name), asked_(asked) {}
 
-  // From 5.0 on, n is the number of offsets, one more than there are cells.
-  void read_offsets_and_connectivity(std::size_t n, std::size_t size) {
-    scan_.next();
-    const std::vector<std::int64_t> offsets = read_whole_numbers(n, read_type(), "offsets");
-    std::string_view word = scan_.word("CONNECTIVITY");
-    if (lower_case(word) == "metadata") {
-      skip_metadata();
-      word = scan_.word("CONNECTIVITY");
-    }
-    if (lower_case(word) != "connectivity") scan_.fail("expected CONNECTIVITY, found " + in_quotes(word));
-    corners_ = read_whole_numbers(size, read_type(), "connectivity");
-    if (offsets.empty()) return;
-    if (offsets.front() != 0 || offsets.back() != static_cast<std::int64_t>(size) ||
-        !std::is_sorted(offsets.begin(), offsets.end()))
-      scan_.fail("OFFSETS must rise from 0 to the size of CONNECTIVITY", cells_line_);
-    offsets_.assign(offsets.begin(), offsets.end());
-  }
+  /// True if reading stopped at an attribute that cannot be skipped.
+  bool has_stray() const { return stray_attribute_; }
 
-  void read_cell_types() {
-    if (has_types_) scan_.fail("a second section CELL_TYPES");
-    has_types_ = true;
-    types_line_ = scan_.word_line();
-    const std::size_t n = read_count("the number of cell types");
-    types_ = read_whole_numbers(n, kInt32, "cell types");
-  }
-
-  // Attributes may be of many kinds. Arrays of one whole number per cell are kept: one may become the references.
-  void read_attributes(std::size_t expected, bool of_cells) {
+  /// Reads those of points or cells. num_cells, has_types: what the file has given so far.
+  void read(std::size_t expected, bool of_cells, std::size_t num_cells, bool has_types) {
+    num_cells_ = num_cells;
+    has_types_ = has_types;
     const std::int64_t n = scan_.integer("the number of attribute entries");
     if (n < 0 || static_cast<std::uint64_t>(n) != expected)
       scan_.fail("attributes for " + std::to_string(n) + " entries, expected " + std::to_string(expected));
@@ -256,12 +187,33 @@ class VtkParser {
       else if (keyword == "field")
         read_field(of_cells);
       else if (keyword == "metadata")
-        skip_metadata();
+        stream_.skip_metadata();
       else if (!skip_attribute(keyword, expected, of_cells))
         end_attributes(*word);
     }
   }
 
+  /// Reads a field that is outside of the attributes of points and cells.
+  void read_stray_field(std::size_t num_cells, bool has_types) {
+    num_cells_ = num_cells;
+    has_types_ = has_types;
+    read_field(false);
+  }
+
+  /// Returns the references, one per cell; empty: there are none. warnings: what became of other attributes is added.
+  std::vector<std::int64_t> references(std::vector<std::string>& warnings) {
+    std::optional<std::size_t> chosen;
+    try {
+      chosen = internal::choose_references(arrays_, asked_, others_);
+    } catch (const InputError& error) {
+      throw InputError(name_ + ": " + error.what());
+    }
+    if (!unread_.empty()) warnings.push_back(unread_);
+    tell_of_references(arrays_, chosen, !asked_.empty(), num_arrays_, warnings);
+    return chosen ? std::move(arrays_[*chosen].values) : std::vector<std::int64_t>();
+  }
+
+ private:
   /// Returns false if the kind or type of the attribute is not known.
   bool skip_attribute(const std::string& keyword, std::size_t n, bool of_cells) {
     const auto* attribute = std::find_if(std::begin(kSkippedAttributes), std::end(kSkippedAttributes),
@@ -269,10 +221,10 @@ class VtkParser {
     if (attribute == std::end(kSkippedAttributes)) return false;
     const std::string_view name = scan_.word("the name of an attribute");
     std::size_t components = attribute->components;
-    if (components == 0) components = read_count("the number of components");
-    if (keyword == "lookup_table") n = read_count("the size of a lookup table");
-    const auto type =
-        attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32) : type_of(scan_.word("a data type"));
+    if (components == 0) components = stream_.read_count("the number of components");
+    if (keyword == "lookup_table") n = stream_.read_count("the size of a lookup table");
+    const auto type = attribute->is_colors ? std::optional(stream_.is_binary() ? kUInt8 : kFloat32)
+                                           : VtkStream::type_of(scan_.word("a data type"));
     if (!type) return false;
     if (keyword == "lookup_table")
       read_array(n, components, *type, "", Array::no_data);
@@ -285,12 +237,12 @@ class VtkParser {
   void end_attributes(std::string_view word) {
     stray_attribute_ = true;
     if (std::none_of(arrays_.begin(), arrays_.end(), may_be_references) || !asked_.empty())
-      mesh_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
+      unread_ = "attributes from " + in_quotes(word) + " on are not read";
   }
 
   void read_scalars(std::size_t n, bool of_cells) {
     const std::string_view name = scan_.word("the name of the scalars");
-    const auto type = type_of(scan_.word("a data type"));
+    const auto type = VtkStream::type_of(scan_.word("a data type"));
     if (!type) return end_attributes(name);
     std::int64_t components = 1;
     if (const auto word = scan_.peek(); word && parse_integer(*word)) components = *parse_integer(*scan_.next());
@@ -304,14 +256,15 @@ class VtkParser {
 
   void read_field(bool of_cells) {
     scan_.word("the name of the field");
-    const std::size_t num_arrays = read_count("the number of arrays");
+    const std::size_t num_arrays = stream_.read_count("the number of arrays");
     for (std::size_t i = 0; i < num_arrays; ++i) {
       auto name = scan_.word("the name of an array");
       while (lower_case(name) == "metadata") {
-        skip_metadata();
+        stream_.skip_metadata();
         name = scan_.word("the name of an array");
       }
-      const std::size_t components = read_count("the number of components"), n = read_count("the number of tuples");
+      const std::size_t components = stream_.read_count("the number of components"),
+                        n = stream_.read_count("the number of tuples");
       if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
       const std::string_view type_name = scan_.word("a data type");
       if (lower_case(type_name) == "string") {
@@ -320,7 +273,7 @@ class VtkParser {
         ++num_arrays_;
         continue;
       }
-      const auto type = type_of(type_name);
+      const auto type = VtkStream::type_of(type_name);
       if (!type) {
         if (!has_types_) scan_.fail("unknown data type " + in_quotes(type_name));
         return end_attributes(name);
@@ -332,7 +285,7 @@ class VtkParser {
   /// Skips a string: in text, a line; in binary, its length in 1, 2, 4 or 8 bytes, as the top two bits say, and then
   /// its characters.
   void skip_string() {
-    if (!binary_) {
+    if (!stream_.is_binary()) {
       if (!scan_.line()) scan_.fail("the file ends within an array");
       return;
     }
@@ -354,8 +307,8 @@ class VtkParser {
       keep = keep && value == std::floor(value);
       if (keep) array.values.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
     };
-    if (binary_ || !type.is_real())
-      read_values(n * components, type, "an array", take);
+    if (stream_.is_binary() || !type.is_real())
+      stream_.read_values(n * components, type, "an array", take);
     else  // values such as cell qualities may well be nan
       for (std::size_t i = 0; i < n * components; ++i) {
         const auto value = parse_number(scan_.word("an array"));
@@ -382,26 +335,126 @@ class VtkParser {
     return name;
   }
 
-  void choose_references() {
-    std::optional<std::size_t> chosen;
-    try {
-      chosen = internal::choose_references(arrays_, asked_, others_);
-    } catch (const InputError& error) {
-      throw InputError(name_ + ": " + error.what());
+  VtkStream& stream_;
+  TextScanner& scan_;
+  std::string name_, asked_;
+  std::size_t num_cells_ = 0;
+  bool has_types_ = false, stray_attribute_ = false;
+  std::vector<CellNumbers> arrays_;
+  std::vector<std::string> others_;  ///< names of other arrays of cells
+  std::size_t num_arrays_ = 0;
+  std::string unread_;  ///< a warning about attributes that are not read; empty: there are none
+};
+
+/// Reads the sections of a file and makes a mesh of them.
+class VtkParser {
+ public:
+  VtkParser(const std::string& name, std::string_view bytes, const std::string& references)
+      : stream_(name, bytes), attributes_(stream_, name, references) {}
+
+  NodalMesh parse() {
+    stream_.read_header();
+    while (const auto word = scan_.next()) {
+      const std::string keyword = lower_case(*word);
+      if (keyword == "points")
+        read_points();
+      else if (keyword == "cells")
+        read_cells();
+      else if (keyword == "cell_types")
+        read_cell_types();
+      else if (keyword == "cell_data")
+        attributes_.read(num_cells_, true, num_cells_, has_types_);
+      else if (keyword == "point_data")
+        attributes_.read(mesh_.positions.size(), false, num_cells_, has_types_);
+      else if (keyword == "field")
+        attributes_.read_stray_field(num_cells_, has_types_);
+      else if (keyword == "metadata")
+        stream_.skip_metadata();
+      else
+        scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
+      if (attributes_.has_stray()) break;  // the mesh itself comes before its attributes
     }
-    if (chosen) references_ = arrays_[*chosen].values;
-    tell_of_references(arrays_, chosen, !asked_.empty(), num_arrays_, mesh_.warnings);
+    if (!has_points_) scan_.fail("the file ends without POINTS");
+    if (!has_cells_) scan_.fail("the file ends without CELLS");
+    if (!has_types_) scan_.fail("the file ends without CELL_TYPES");
+    build_cells();
+    return std::move(mesh_);
   }
 
-  /// METADATA runs to the next empty line.
-  void skip_metadata() {
-    scan_.line();
-    while (const auto line = scan_.line())
-      if (line->find_first_not_of(" \t") == std::string_view::npos) break;
+ private:
+  void read_points() {
+    if (has_points_) scan_.fail("a second section POINTS");
+    has_points_ = true;
+    const std::size_t n = stream_.read_count("the number of points");
+    const ValueType type = stream_.read_type();
+    if (n > scan_.bytes_left() / 3) scan_.fail("the file ends within the coordinates");
+    mesh_.positions.resize(n);
+    stream_.read_values(3 * n, type, "a coordinate", [&](std::size_t i, double value) {
+      if (!std::isfinite(value)) scan_.fail("point " + std::to_string(i / 3) + " has a coordinate that is not finite");
+      mesh_.positions[i / 3][static_cast<Eigen::Index>(i % 3)] = value;
+    });
+  }
+
+  void read_cells() {
+    if (has_cells_) scan_.fail("a second section CELLS");
+    has_cells_ = true;
+    cells_line_ = scan_.word_line();
+    const std::size_t n = stream_.read_count("the number of cells"), size = stream_.read_count("the size of CELLS");
+    const auto next = stream_.major() >= 5 ? scan_.peek() : std::nullopt;
+    if (next && lower_case(*next) == "offsets")
+      read_offsets_and_connectivity(n, size);
+    else if (next && stream_.is_binary())
+      scan_.fail("expected OFFSETS, found " + in_quotes(*next));
+    else
+      split_counted_lists(n, stream_.read_whole_numbers(size, kInt32, "cell corners"));
+    num_cells_ = offsets_.size() - 1;
+  }
+
+  // Before 5.0, each cell is its number of corners followed by the corners.
+  void split_counted_lists(std::size_t n, const std::vector<std::int64_t>& numbers) {
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < n; ++c) {
+      if (at == numbers.size()) scan_.fail("CELLS has fewer cells than it says", cells_line_);
+      const std::int64_t corners = numbers[at++];
+      if (corners < 0 || static_cast<std::uint64_t>(corners) > numbers.size() - at)
+        scan_.fail(
+            "cell " + std::to_string(c) + " has " + std::to_string(corners) + " corners, beyond the size of CELLS",
+            cells_line_);
+      corners_.insert(corners_.end(), numbers.begin() + at, numbers.begin() + at + corners);
+      at += static_cast<std::size_t>(corners);
+      offsets_.push_back(corners_.size());
+    }
+    if (at != numbers.size()) scan_.fail("the size of CELLS is larger than its cells", cells_line_);
+  }
+
+  // From 5.0 on, n is the number of offsets, one more than there are cells.
+  void read_offsets_and_connectivity(std::size_t n, std::size_t size) {
+    scan_.next();
+    const std::vector<std::int64_t> offsets = stream_.read_whole_numbers(n, stream_.read_type(), "offsets");
+    std::string_view word = scan_.word("CONNECTIVITY");
+    if (lower_case(word) == "metadata") {
+      stream_.skip_metadata();
+      word = scan_.word("CONNECTIVITY");
+    }
+    if (lower_case(word) != "connectivity") scan_.fail("expected CONNECTIVITY, found " + in_quotes(word));
+    corners_ = stream_.read_whole_numbers(size, stream_.read_type(), "connectivity");
+    if (offsets.empty()) return;
+    if (offsets.front() != 0 || offsets.back() != static_cast<std::int64_t>(size) ||
+        !std::is_sorted(offsets.begin(), offsets.end()))
+      scan_.fail("OFFSETS must rise from 0 to the size of CONNECTIVITY", cells_line_);
+    offsets_.assign(offsets.begin(), offsets.end());
+  }
+
+  void read_cell_types() {
+    if (has_types_) scan_.fail("a second section CELL_TYPES");
+    has_types_ = true;
+    types_line_ = scan_.word_line();
+    const std::size_t n = stream_.read_count("the number of cell types");
+    types_ = stream_.read_whole_numbers(n, kInt32, "cell types");
   }
 
   void build_cells() {
-    choose_references();
+    references_ = attributes_.references(mesh_.warnings);
     if (types_.size() != num_cells_)
       scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells",
                  types_line_);
@@ -417,7 +470,7 @@ class VtkParser {
       for (const std::int64_t node : nodes)  // nodes that complete cells come after those of the file
         if (node < 0 || static_cast<std::uint64_t>(node) >= num_points)
           fail("names point " + std::to_string(node) + " of " + std::to_string(num_points));
-      const VtkCellUse use = add_vtk_cell(mesh_, cells, type, nodes, old_numbers_, fail);
+      const VtkCellUse use = add_vtk_cell(mesh_, cells, type, nodes, stream_.has_old_numbers(), fail);
       if (use == VtkCellUse::bezier)
         fail("has VTK type " + std::to_string(type) + ", a Bezier cell, which is only read from a .vtu");
       if (use == VtkCellUse::lower_dimension)
@@ -439,15 +492,12 @@ class VtkParser {
     num_beyond_ += !fits;
   }
 
-  TextScanner scan_;
-  std::string name_, asked_;
+  VtkStream stream_;
+  TextScanner& scan_ = stream_.scan();
+  VtkAttributes attributes_;
   NodalMesh mesh_;
-  std::vector<CellNumbers> arrays_;  ///< arrays from which the references may be chosen
-  std::vector<std::string> others_;  ///< names of the other cell data
-  int major_ = 0;
-  bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false,
-       old_numbers_ = false;
-  std::size_t num_arrays_ = 0, num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
+  bool has_points_ = false, has_cells_ = false, has_types_ = false;
+  std::size_t num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
   std::vector<std::size_t> offsets_{0};
   std::vector<std::int64_t> corners_, types_, references_;
 };
