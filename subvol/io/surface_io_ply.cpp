@@ -61,56 +61,22 @@ struct PlyElement {
 /// How the rows of a text are divided: a row holds one element, as the format says, or as many values as fit.
 enum class PlyRows { elements, values };
 
-class PlyParser {
+/// What the header of a file says.
+struct PlyHeader {
+  bool text = true;
+  std::endian order = std::endian::little;
+  std::vector<PlyElement> elements;
+  LeftOut left_out;  ///< properties that are not used
+};
+
+/// Reads the header of a file, and chooses what its properties are used for.
+class PlyHeaderReader {
  public:
-  /// attribute  vertex property whose values are kept, too; empty: none.
-  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "",
-            PlyRows rows = PlyRows::elements)
-      : name_(name),
-        size_(bytes.size()),
-        scan_(name, bytes, TextScanner::Comments::none),
-        attribute_(std::move(attribute)),
-        rows_(rows) {}
+  /// attribute  as for `PlyParser`.
+  PlyHeaderReader(const std::string& name, TextScanner& scan, const std::string& attribute)
+      : name_(name), scan_(scan), attribute_(attribute) {}
 
-  ParsedSurface parse() {
-    read_header();
-    for (const PlyElement& element : elements_) read_element(element);
-    if (text_ && rows_ == PlyRows::values && scan_.peek()) fail("more values than the header says");
-    for (const Index v : mesh_.face_vertices)
-      if (static_cast<std::size_t>(v) >= mesh_.positions.size())
-        throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
-                         std::to_string(mesh_.positions.size()));
-    add_groups();
-    ParsedSurface parsed{std::move(mesh_), {}};
-    if (longer_rows_ > 0)
-      parsed.warnings.push_back(std::to_string(longer_rows_) + (longer_rows_ == 1 ? " row has" : " rows have") +
-                                " more values than the header says, the first in line " +
-                                std::to_string(first_longer_row_) + ": the rest of each row is passed over");
-    left_out_.tell(parsed.warnings);
-    return parsed;
-  }
-
-  /// Reads only the header; returns true if it announces faces.
-  bool has_faces() {
-    read_header();
-    return std::any_of(elements_.begin(), elements_.end(),
-                       [](const PlyElement& element) { return element.holds_faces() && element.count > 0; });
-  }
-
-  /// True if a row held more or fewer values than the header says.
-  bool has_other_rows() const { return has_shorter_row_ || longer_rows_ > 0; }
-
-  /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
-  std::vector<double> take_attribute() { return std::move(values_); }
-
- private:
-  /// Throws InputError that names the line in text, or the byte in binary data.
-  [[noreturn]] void fail(const std::string& message) const {
-    if (text_) scan_.fail(message);
-    throw InputError(name_ + ": byte " + std::to_string(size_ - scan_.bytes_left()) + ": " + message);
-  }
-
-  void read_header() {
+  PlyHeader read() {
     const auto first = scan_.line();
     if (first != std::optional<std::string_view>("ply")) scan_.fail("expected ply in the first line");
     bool has_format = false;
@@ -120,7 +86,7 @@ class PlyParser {
       if (keyword == "end_header") {
         if (!has_format) scan_.fail("the header has no format");
         choose_face_properties();
-        return;
+        return std::move(header_);
       }
       if (keyword == "format")
         has_format = true, read_format(words);
@@ -134,12 +100,13 @@ class PlyParser {
     scan_.fail("the file ends where end_header is expected");
   }
 
+ private:
   void read_format(TextScanner& words) {
     const std::string_view format = words.next().value_or("");
     if (words.next().value_or("") != "1.0") scan_.fail("expected version 1.0 of the format");
-    text_ = format == "ascii";
-    order_ = format == "binary_big_endian" ? std::endian::big : std::endian::little;
-    if (!text_ && format != "binary_big_endian" && format != "binary_little_endian")
+    header_.text = format == "ascii";
+    header_.order = format == "binary_big_endian" ? std::endian::big : std::endian::little;
+    if (!header_.text && format != "binary_big_endian" && format != "binary_little_endian")
       scan_.fail("unknown format " + in_quotes(format));
   }
 
@@ -150,11 +117,11 @@ class PlyParser {
     if (*count > std::numeric_limits<Index>::max() || static_cast<std::uint64_t>(*count) > scan_.bytes_left())
       scan_.fail("element " + in_quotes(name) + " has a count of " + std::to_string(*count) +
                  ", more than the rest of the file can hold");
-    elements_.push_back({std::string(name), static_cast<std::size_t>(*count), {}});
+    header_.elements.push_back({std::string(name), static_cast<std::size_t>(*count), {}});
   }
 
   void read_property_line(TextScanner& words) {
-    if (elements_.empty()) scan_.fail("a property before any element");
+    if (header_.elements.empty()) scan_.fail("a property before any element");
     Property property;
     std::string_view word = words.next().value_or("");
     if (word == "list") {
@@ -165,18 +132,18 @@ class PlyParser {
     }
     property.type = type_of(word);
     const std::string_view name = words.next().value_or("");
-    property.use = use_of(elements_.back().name, name, property.is_list);
+    property.use = use_of(header_.elements.back().name, name, property.is_list);
     property.name = name;
-    elements_.back().properties.push_back(property);
+    header_.elements.back().properties.push_back(property);
   }
 
   /// Chooses the properties of faces that become groups: the one whose name tells most of a material or a region, else
   /// a color. Counts all properties that are not used.
   void choose_face_properties() {
-    if (std::count_if(elements_.begin(), elements_.end(),
+    if (std::count_if(header_.elements.begin(), header_.elements.end(),
                       [](const PlyElement& e) { return e.holds_faces() && e.count > 0; }) > 1)
       scan_.fail("more than one element of faces or tristrips; expected one");
-    for (PlyElement& element : elements_) {
+    for (PlyElement& element : header_.elements) {
       if (element.name == "face") choose_groups(element);
       for (const Property& property : element.properties) note(element, property);
     }
@@ -210,31 +177,7 @@ class PlyParser {
     const bool is_normal = name == "nx" || name == "ny" || name == "nz";
     if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
     const bool is_known = element.name == "vertex" || element.name == "face";
-    left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
-  }
-
-  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the
-  /// property that subvol writes, 0 is no group.
-  void add_groups() {
-    if (colors_) mesh_.face_groups = colors_->take(left_out_, "colors of faces");
-    if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
-    std::vector<std::int64_t> found = labels_;
-    sort_unique(found);
-    if (found.size() > kMostLabels) return left_out_.add("properties of face");
-    if (label_name_ == "reference" && found.front() == 0) found.erase(found.begin());
-    if (found.empty()) return;
-    const bool are_numbers = found.front() > 0 && found.back() <= std::numeric_limits<int>::max();
-    FaceGroups& groups = mesh_.face_groups;
-    for (const std::int64_t label : found) {
-      const auto next = static_cast<int>(groups.groups.size()) + 1;
-      groups.groups.push_back({are_numbers ? "" : label_name_ + " " + std::to_string(label),
-                               are_numbers ? static_cast<int>(label) : next, 2});
-    }
-    for (const std::int64_t label : labels_) {
-      const auto place = std::lower_bound(found.begin(), found.end(), label);
-      const bool is_group = place != found.end() && *place == label;
-      groups.of_face.push_back(is_group ? static_cast<Index>(place - found.begin()) : kNoIndex);
-    }
+    header_.left_out.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
   }
 
   ValueType type_of(std::string_view word) const {
@@ -257,6 +200,85 @@ class PlyParser {
                                     : Property::Use::none;
   }
 
+  const std::string& name_;
+  TextScanner& scan_;
+  const std::string& attribute_;
+  PlyHeader header_;
+};
+
+class PlyParser {
+ public:
+  /// attribute  vertex property whose values are kept, too; empty: none.
+  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "",
+            PlyRows rows = PlyRows::elements)
+      : name_(name),
+        size_(bytes.size()),
+        scan_(name, bytes, TextScanner::Comments::none),
+        attribute_(std::move(attribute)),
+        rows_(rows) {}
+
+  ParsedSurface parse() {
+    header_ = PlyHeaderReader(name_, scan_, attribute_).read();
+    for (const PlyElement& element : header_.elements) read_element(element);
+    if (header_.text && rows_ == PlyRows::values && scan_.peek()) fail("more values than the header says");
+    for (const Index v : mesh_.face_vertices)
+      if (static_cast<std::size_t>(v) >= mesh_.positions.size())
+        throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
+                         std::to_string(mesh_.positions.size()));
+    add_groups();
+    ParsedSurface parsed{std::move(mesh_), {}};
+    if (longer_rows_ > 0)
+      parsed.warnings.push_back(std::to_string(longer_rows_) + (longer_rows_ == 1 ? " row has" : " rows have") +
+                                " more values than the header says, the first in line " +
+                                std::to_string(first_longer_row_) + ": the rest of each row is passed over");
+    header_.left_out.tell(parsed.warnings);
+    return parsed;
+  }
+
+  /// Reads only the header; returns true if it announces faces.
+  bool has_faces() {
+    header_ = PlyHeaderReader(name_, scan_, attribute_).read();
+    return std::any_of(header_.elements.begin(), header_.elements.end(),
+                       [](const PlyElement& element) { return element.holds_faces() && element.count > 0; });
+  }
+
+  /// True if a row held more or fewer values than the header says.
+  bool has_other_rows() const { return has_shorter_row_ || longer_rows_ > 0; }
+
+  /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
+  std::vector<double> take_attribute() { return std::move(values_); }
+
+ private:
+  /// Throws InputError that names the line in text, or the byte in binary data.
+  [[noreturn]] void fail(const std::string& message) const {
+    if (header_.text) scan_.fail(message);
+    throw InputError(name_ + ": byte " + std::to_string(size_ - scan_.bytes_left()) + ": " + message);
+  }
+
+  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the
+  /// property that subvol writes, 0 is no group.
+  void add_groups() {
+    if (colors_) mesh_.face_groups = colors_->take(header_.left_out, "colors of faces");
+    if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
+    std::vector<std::int64_t> found = labels_;
+    sort_unique(found);
+    if (found.size() > kMostLabels) return header_.left_out.add("properties of face");
+    if (label_name_ == "reference" && found.front() == 0) found.erase(found.begin());
+    if (found.empty()) return;
+    const bool are_numbers = found.front() > 0 && found.back() <= std::numeric_limits<int>::max();
+    FaceGroups& groups = mesh_.face_groups;
+    for (const std::int64_t label : found) {
+      const auto next = static_cast<int>(groups.groups.size()) + 1;
+      groups.groups.push_back({are_numbers ? "" : label_name_ + " " + std::to_string(label),
+                               are_numbers ? static_cast<int>(label) : next, 2});
+    }
+    for (const std::int64_t label : labels_) {
+      const auto place = std::lower_bound(found.begin(), found.end(), label);
+      const bool is_group = place != found.end() && *place == label;
+      groups.of_face.push_back(is_group ? static_cast<Index>(place - found.begin()) : kNoIndex);
+    }
+  }
+
   void read_element(const PlyElement& element) {
     const bool vertices = element.name == "vertex", faces = element.name == "face";
     if (vertices && !(element.has(Property::Use::x) && element.has(Property::Use::y) && element.has(Property::Use::z)))
@@ -265,12 +287,12 @@ class PlyParser {
     if (element.name == "tristrips" && !element.has(Property::Use::strip)) fail("tristrips without vertex_indices");
     // An element without properties takes no bytes, so its count means nothing.
     if (element.properties.empty()) return;
-    if (element.count > (scan_.bytes_left() + 1) / element.least_bytes(text_))
+    if (element.count > (scan_.bytes_left() + 1) / element.least_bytes(header_.text))
       fail("element " + in_quotes(element.name) + " has a count of " + std::to_string(element.count) +
            ", more than the rest of the file can hold");
     for (std::size_t i = 0; i < element.count; ++i) {
       if (vertices) mesh_.positions.emplace_back();
-      text_ ? read_row(element) : read_properties(element);
+      header_.text ? read_row(element) : read_properties(element);
       if (!faces) continue;
       mesh_.face_offsets.push_back(mesh_.face_vertices.size());
       if (element.has(Property::Use::red)) {
@@ -324,8 +346,8 @@ class PlyParser {
     } else if (property.use == Use::label) {
       label_name_ = property.name;
       constexpr const char* kFaceLabelText = "a label of a face";
-      labels_.push_back(text_ ? scan_.integer(kFaceLabelText)
-                              : static_cast<std::int64_t>(read_whole(property.type, kFaceLabelText)));
+      labels_.push_back(header_.text ? scan_.integer(kFaceLabelText)
+                                     : static_cast<std::int64_t>(read_whole(property.type, kFaceLabelText)));
     } else if (property.use >= Use::red) {
       const double level = read_number(property.type, "a color of a face");
       color_[static_cast<std::size_t>(property.use) - static_cast<std::size_t>(Use::red)] =
@@ -359,21 +381,21 @@ class PlyParser {
   }
 
   double read_whole(ValueType type, const char* what) {
-    if (text_) return static_cast<double>(scan_.integer(what));
+    if (header_.text) return static_cast<double>(scan_.integer(what));
     const double value = read_binary(type);
     if (value != std::floor(value)) fail(std::string(what) + " must be a whole number");
     return value;
   }
 
   double read_number(ValueType type, const std::string& what) {
-    if (text_) return scan_.number(what.c_str());
+    if (header_.text) return scan_.number(what.c_str());
     const double value = read_binary(type);
     if (!std::isfinite(value)) fail(what + " is not finite");
     return value;
   }
 
   void skip_value(ValueType type) {
-    if (text_)
+    if (header_.text)
       scan_.word("a value");
     else
       read_binary(type);
@@ -381,16 +403,13 @@ class PlyParser {
 
   double read_binary(ValueType type) {
     if (type.size > scan_.bytes_left()) fail("the file ends within its data");
-    return decode(scan_.bytes(type.size, "the data").data(), type, order_);
+    return decode(scan_.bytes(type.size, "the data").data(), type, header_.order);
   }
 
   std::string name_;
   std::size_t size_;
   TextScanner scan_;
-  bool text_ = true;
-  std::endian order_ = std::endian::little;
-  std::vector<PlyElement> elements_;
-  LeftOut left_out_;
+  PlyHeader header_;
   PolygonMesh mesh_;
   std::vector<Index> strip_;  // vertices of the present strip of triangles
   std::string attribute_;
