@@ -3,6 +3,7 @@
 
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/base/markup.h"
 #include "subvol/export/boundary_file.h"
 #include "subvol/export/text_format.h"
 #include "subvol/export/vtu_arrays.h"
@@ -170,23 +171,6 @@ std::string vtp_text(const PolygonMesh& mesh) {
 
 // --- 3MF ------------------------------------------------------------------------------------------------------------
 
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&')
-      result += "&amp;";
-    else if (c == '<')
-      result += "&lt;";
-    else if (c == '"')
-      result += "&quot;";
-    else if (static_cast<unsigned char>(c) < ' ')
-      result += ' ';
-    else
-      result += c;
-  }
-  return result;
-}
-
 std::string model_of(const TriangleMesh& mesh) {
   const std::vector<Group>& groups = mesh.face_groups.groups;
   std::string text =
@@ -195,7 +179,7 @@ std::string model_of(const TriangleMesh& mesh) {
   if (!groups.empty()) {
     text += "<basematerials id=\"1\">\n";
     for (const Group& group : groups)
-      text += "<base name=\"" + escaped(label_of(group)) + "\" displaycolor=\"#C0C0C0\"/>\n";
+      text += "<base name=\"" + escaped_markup(label_of(group)) + "\" displaycolor=\"#C0C0C0\"/>\n";
     text += "</basematerials>\n";
   }
   text += "<object id=\"2\" type=\"model\">\n<mesh>\n<vertices>\n";

@@ -2,6 +2,7 @@
 #include "subvol/export/viewer_page.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/markup.h"
 #include "subvol/export/packed_array.h"
 #include "subvol/export/viewer_script.h"
 
@@ -21,19 +22,6 @@ std::string script_string(const std::string& text) {
   for (const char c : json) {
     if (c == '<')
       result += "\\u003c";
-    else
-      result += c;
-  }
-  return result;
-}
-
-std::string escaped_title(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<')
-      result += "&lt;";
-    else if (c == '&')
-      result += "&amp;";
     else
       result += c;
   }
@@ -185,7 +173,8 @@ std::string viewer_page(const ViewerContent& content) {
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" "
          "href=\"data:,\">\n"
          "<title>" +
-         escaped_title(content.title) + "</title>\n</head>\n<body>\n" + element(content, "page") + "</body>\n</html>\n";
+         escaped_markup(content.title) + "</title>\n</head>\n<body>\n" + element(content, "page") +
+         "</body>\n</html>\n";
 }
 
 }  // namespace subvol::internal

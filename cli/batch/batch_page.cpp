@@ -4,6 +4,7 @@
 #include "cli/runs/page_parts.h"
 #include "cli/runs/report_plots.h"
 #include "subvol/base/format.h"
+#include "subvol/base/markup.h"
 #include "subvol/base/version.h"
 
 #include <algorithm>
@@ -20,8 +21,8 @@ using Link = std::function<std::string(const ModelFigures&)>;
 
 std::string linked_id(const ModelFigures& model, const Link& link) {
   const std::string address = link(model);
-  if (address.empty()) return escaped(model.id);
-  return "<a href=\"" + escaped(address) + "\">" + escaped(model.id) + "</a>";
+  if (address.empty()) return escaped_markup(model.id);
+  return "<a href=\"" + escaped_markup(address) + "\">" + escaped_markup(model.id) + "</a>";
 }
 
 std::string text_of(double value) { return std::isnan(value) ? "" : number(value); }
@@ -37,7 +38,7 @@ std::string left_out(std::size_t all, std::size_t shown) {
 std::string heading(const std::string& title, const BatchSummary& summary) {
   const std::size_t all = summary.models.size(), valid = summary.count(Outcome::valid),
                     partial = summary.count(Outcome::not_converged), failed = all - valid - partial;
-  std::string text = "<h1>" + escaped(title) + "</h1>\n<p>" + std::to_string(all) + " models: ";
+  std::string text = "<h1>" + escaped_markup(title) + "</h1>\n<p>" + std::to_string(all) + " models: ";
   text += formatted("<span class=\"verdict good\">%zu valid</span> (%s)", valid, percent(valid, all).c_str());
   if (partial > 0) text += formatted(", %zu not converged (%s)", partial, percent(partial, all).c_str());
   if (failed > 0)
@@ -67,7 +68,7 @@ std::string failures(const BatchSummary& summary, const Link& link) {
     for (const ModelFigures& model : summary.models) {
       if (model.outcome != static_cast<Outcome>(i)) continue;
       if (++shown > kMostReasons) break;
-      rows += row({linked_id(model, link), escaped(model.reason)});
+      rows += row({linked_id(model, link), escaped_markup(model.reason)});
     }
     if (rows.empty()) continue;
     text +=
@@ -137,7 +138,8 @@ std::string models(const BatchSummary& summary, const Link& link) {
 
 std::string comparison_text(const PageComparison& page, const BatchSummary& now, const Link& link) {
   const Comparison& found = page.comparison;
-  std::string text = "<p>Compared with " + escaped(page.name) + formatted(": %zu models in both", found.num_common);
+  std::string text =
+      "<p>Compared with " + escaped_markup(page.name) + formatted(": %zu models in both", found.num_common);
   if (found.num_only_before > 0) text += formatted(", %zu only there", found.num_only_before);
   if (found.num_only_now > 0) text += formatted(", %zu only here", found.num_only_now);
   text +=
@@ -146,7 +148,7 @@ std::string comparison_text(const PageComparison& page, const BatchSummary& now,
     std::string rows;
     for (std::size_t i = 0; i < std::min(pairs.size(), kMostBatchPageRows); ++i) {
       const ModelFigures &old = page.before.models[pairs[i].before], &fresh = now.models[pairs[i].now];
-      rows += row({linked_id(fresh, link), value(old), value(fresh), escaped(fresh.reason)});
+      rows += row({linked_id(fresh, link), value(old), value(fresh), escaped_markup(fresh.reason)});
     }
     if (!rows.empty()) text += table({title, "before", "now", ""}, rows) + left_out(pairs.size(), kMostBatchPageRows);
   };

@@ -4,6 +4,7 @@
 #include "cli/runs/report_plots.h"
 #include "subvol/base/base64.h"
 #include "subvol/base/format.h"
+#include "subvol/base/markup.h"
 
 namespace subvol::cli {
 
@@ -45,11 +46,11 @@ std::string page_begin(const std::string& title) {
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
          "<link rel=\"icon\" href=\"data:,\">\n<title>" +
-         escaped(title) + "</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n";
+         escaped_markup(title) + "</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n";
 }
 
 std::string page_end(const std::string& version) {
-  return "<p class=\"soft\">subvol " + escaped(version) + "</p>\n</body>\n</html>\n";
+  return "<p class=\"soft\">subvol " + escaped_markup(version) + "</p>\n</body>\n</html>\n";
 }
 
 std::string number(double value) { return formatted("%.6g", value); }
@@ -71,7 +72,7 @@ std::string section(const char* title, const std::string& body) {
 }
 
 std::string picture_figure(const std::string& title, std::string_view png, const std::string& caption) {
-  std::string text = "<figure><img alt=\"" + escaped(title) + "\" src=\"data:image/png;base64,";
+  std::string text = "<figure><img alt=\"" + escaped_markup(title) + "\" src=\"data:image/png;base64,";
   append_base64(text, png);
   return text + "\"><figcaption>" + caption + "</figcaption></figure>\n";
 }

@@ -5,6 +5,7 @@
 #include "cli/runs/report_plots.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/base/markup.h"
 #include "subvol/export/color_map.h"
 #include "subvol/export/vtu_arrays.h"
 
@@ -19,10 +20,10 @@ namespace {
 
 /// A JSON value as text for people.
 std::string words(const Json& value) {
-  if (value.is_string()) return escaped(value.get<std::string>());
+  if (value.is_string()) return escaped_markup(value.get<std::string>());
   if (value.is_number_float()) return number(value.get<double>());
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  return escaped(value.dump());
+  return escaped_markup(value.dump());
 }
 
 const Json& part(const Json& report, const char* name) {
@@ -41,20 +42,22 @@ std::string input_name(const Json& report) {
 
 std::string heading(const Json& report) {
   const std::string title = "subvol " + report.value("command", std::string()) + ": " + input_name(report);
-  std::string text = "<h1>" + escaped(title) + "</h1>\n<p>";
+  std::string text = "<h1>" + escaped_markup(title) + "</h1>\n<p>";
   if (report.contains("valid"))
     text += std::string(report["valid"].get<bool>() ? "<span class=\"verdict good\">Valid"
                                                     : "<span class=\"verdict bad\">Not valid") +
             (report.contains("stop_reason") ? ",</span> " : ".</span> ");
   if (report.contains("stop_reason"))
     text += "<span class=\"verdict " + std::string(report.value("converged", false) ? "good" : "bad") + "\">" +
-            words(report["stop_reason"]) + "</span>: " + escaped(report.value("explanation", std::string())) + ".";
+            words(report["stop_reason"]) + "</span>: " + escaped_markup(report.value("explanation", std::string())) +
+            ".";
   return text + "</p>\n";
 }
 
 std::string color_scale(const ReportPicture& picture) {
   if (picture.high.empty()) return {};
-  std::string text = "<span class=\"scale\">" + escaped(picture.low) + "<i style=\"background:linear-gradient(90deg";
+  std::string text =
+      "<span class=\"scale\">" + escaped_markup(picture.low) + "<i style=\"background:linear-gradient(90deg";
   constexpr int kColorScaleSteps = 8;
   for (int i = 0; i <= kColorScaleSteps; ++i) {
     const LinearColor color = quality_color(std::max(1e-9, double(i) / kColorScaleSteps));
@@ -63,17 +66,17 @@ std::string color_scale(const ReportPicture& picture) {
       text += formatted(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
     text += ')';
   }
-  return text + ")\"></i>" + escaped(picture.high) + "</span>";
+  return text + ")\"></i>" + escaped_markup(picture.high) + "</span>";
 }
 
 std::string gallery(std::span<const ReportPicture> pictures, std::span<const std::string> notes) {
   std::string text;
   if (!pictures.empty()) text += "<div class=\"grid\">\n";
   for (const ReportPicture& picture : pictures) {
-    text += picture_figure(picture.title, picture.png, escaped(picture.title) + color_scale(picture));
+    text += picture_figure(picture.title, picture.png, escaped_markup(picture.title) + color_scale(picture));
   }
   if (!pictures.empty()) text += "</div>\n";
-  for (const std::string& note : notes) text += "<p class=\"soft\">" + escaped(note) + "</p>\n";
+  for (const std::string& note : notes) text += "<p class=\"soft\">" + escaped_markup(note) + "</p>\n";
   return text;
 }
 
@@ -183,7 +186,7 @@ std::string thicknesses(const Json& report) {
   for (const auto& [side, t] : part(report, "thickness").items())
     for (const char* kind : {"asked", "limited", "achieved", "clearance"})
       if (t.contains(kind))
-        rows += row({escaped(side) + ", " + kind, words(t[kind].at("mean")), words(t[kind].at("min")),
+        rows += row({escaped_markup(side) + ", " + kind, words(t[kind].at("mean")), words(t[kind].at("min")),
                      words(t[kind].at("max"))});
   return rows.empty() ? "" : table({"thickness", "mean", "min", "max"}, rows);
 }
@@ -220,7 +223,8 @@ std::string histogram(const Json& report) {
 
 std::string costs(const Json& report) {
   std::string rows;
-  for (const auto& [name, seconds] : part(report, "seconds").items()) rows += row({escaped(name), words(seconds)});
+  for (const auto& [name, seconds] : part(report, "seconds").items())
+    rows += row({escaped_markup(name), words(seconds)});
   if (report.contains("peak_memory_bytes"))
     rows += row({"peak memory, MB", number(report["peak_memory_bytes"].get<double>() * 1e-6)});
   return rows.empty() ? "" : table({"part", "seconds"}, rows);
@@ -231,11 +235,11 @@ std::string command(const Json& report) {
   for (const Json& word : report.value("command_line", Json::array())) {
     const std::string plain = word.get<std::string>();
     const bool quoted = plain.empty() || plain.find_first_of(" \t\"'$&|<>()*;") != std::string::npos;
-    text += (text.empty() ? "" : " ") + (quoted ? '\'' + escaped(plain) + '\'' : escaped(plain));
+    text += (text.empty() ? "" : " ") + (quoted ? '\'' + escaped_markup(plain) + '\'' : escaped_markup(plain));
   }
   if (!text.empty()) text = "<pre>" + text + "</pre>\n";
   std::string rows;
-  for (const auto& [name, value] : part(report, "options").items()) rows += row({escaped(name), words(value)});
+  for (const auto& [name, value] : part(report, "options").items()) rows += row({escaped_markup(name), words(value)});
   if (rows.empty()) return text;
   return text + "<details><summary>All options in force</summary>" + table({"option", "value"}, rows) + "</details>\n";
 }

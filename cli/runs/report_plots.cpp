@@ -24,19 +24,6 @@ std::string open_svg(const char* title) {
 
 }  // namespace
 
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      case '\'': result += "&#39;"; break;
-      default: result += c;
-    }
-  return result;
-}
-
 std::string energy_plot(const Json& stages) {
   static constexpr std::array<const char*, 3> kTerms{"surface", "volume", "total"};
   std::array<std::vector<double>, 3> energies;

@@ -4,12 +4,8 @@
 #include "cli/runs/run_options.h"
 
 #include <string>
-#include <string_view>
 
 namespace subvol::cli {
-
-/// Escapes text for HTML and its attributes.
-std::string escaped(std::string_view text);
 
 /// Surface, volume and total energy in every iteration of all stages, logarithmic, as SVG; empty without iterations.
 /// Energies that are not positive are drawn at the lower end of the plot.

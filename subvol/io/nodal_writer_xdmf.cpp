@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/markup.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/nodal_formats.h"
 #include "subvol/io/nodal_sides.h"
@@ -77,31 +78,12 @@ void append_geometry(std::string& text, const NodalMesh& mesh) {
   text += "</Geometry>\n";
 }
 
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&')
-      result += "&amp;";
-    else if (c == '<')
-      result += "&lt;";
-    else if (c == '>')
-      result += "&gt;";
-    else if (c == '"')
-      result += "&quot;";
-    else if (static_cast<unsigned char>(c) < ' ')
-      result += ' ';
-    else
-      result += c;
-  }
-  return result;
-}
-
 /// Appends the names of numbers as meshio writes and reads them: a document of its own.
 void append_names(std::string& text, const std::vector<Group>& groups) {
   if (groups.empty()) return;
   text += "<Information Name=\"names\"><![CDATA[<main>";
   for (const Group& group : groups)
-    text += "<map key=\"" + escaped(label_of(group)) + "\" dim=\"" + std::to_string(group.dimension) + "\">" +
+    text += "<map key=\"" + escaped_markup(label_of(group)) + "\" dim=\"" + std::to_string(group.dimension) + "\">" +
             std::to_string(group.number) + "</map>";
   text += "</main>]]></Information>\n";
 }
