@@ -123,7 +123,7 @@ class Filling {
 
 constexpr const char* kFillHelp =
     R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, regions='auto', wrap=None, keep_groups=False,
-    cage=False, levels=1, tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, tune={},
+    cage=False, levels=1, tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, tune=None,
     checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 

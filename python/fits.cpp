@@ -235,7 +235,7 @@ constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, keep_cage=True, crease_angle=None, keep_groups=False, lambda_far=1.0,
     quality=0.65, lambda_close=None, correspondence='closest', solver='newton', energy='hencky', point_weights='equal',
-    max_iterations=0, time_limit=0.0, tune={}, order=None, basis='legendre', adaptive=False, keep_states=False,
+    max_iterations=0, time_limit=0.0, tune=None, order=None, basis='legendre', adaptive=False, keep_states=False,
     checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 

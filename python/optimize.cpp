@@ -213,7 +213,7 @@ class Optimization {
 constexpr const char* kOptimizeHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
     max_tolerance=0.5, quality=0.65, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0,
-    tune={}, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
+    tune=None, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Untangles a mesh and improves its cells, or curves it: OptimizeResult.
