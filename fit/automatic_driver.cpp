@@ -82,7 +82,7 @@ QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule s
 }
 
 void AutomaticDriver::begin_cage() {
-  cage_.emplace(std::move(mesh_));
+  cage_.emplace(std::move(mesh_), options_.tuning);
   mesh_ = cage_->mesh();
 }
 

@@ -157,6 +157,7 @@ class Optimization {
       options.control = curving_.control;
       options.control.max_iterations = 0;  // the caller's limit is that of the fit
       options.control.log = log;
+      options.tuning = curving_.tuning;
       return options;
     };
     const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/viewing.h"
-#include "cli/runs/report_plots.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
 #include "python/module.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/base/markup.h"
 #include "subvol/export/viewer_page.h"
 #include "subvol/mesh/validate.h"
 
@@ -61,8 +61,8 @@ View view(const py::object& object, const py::object& target_object, const py::k
 
 /// A page as a frame inside another.
 std::string frame(const std::string& page) {
-  return "<iframe title=\"subvol\" style=\"width: 100%; height: 36rem; border: 0\" srcdoc=\"" + cli::escaped(page) +
-         "\"></iframe>";
+  return "<iframe title=\"subvol\" style=\"width: 100%; height: 36rem; border: 0\" srcdoc=\"" +
+         internal::escaped_markup(page) + "\"></iframe>";
 }
 
 void add_show(py::module_& module, const char* name) {

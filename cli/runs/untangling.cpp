@@ -63,7 +63,7 @@ void untangle_template(const std::string& path, const RunOptions& run, const Opt
     SolveControl control = options.control;
     control.progress = progress;
     control.cancelled = cancelled;
-    return untangle_before_fit(mesh, labels, {.control = control});
+    return untangle_before_fit(mesh, labels, {.control = control, .tuning = options.tuning});
   });
 }
 

@@ -10,9 +10,9 @@
 
 namespace subvol::internal {
 
-FittedCage::FittedCage(VolumeMesh control) : cage(std::move(control)) {
+FittedCage::FittedCage(VolumeMesh control, const Tuning& tuning) : cage(std::move(control)) {
   const SparseMap unknowns = identity_map(cage.num_vertices());
-  level_ = make_fit_level(cage, unknowns, limit_map(cage), FitOptions{}, 0, true);
+  level_ = make_fit_level(cage, unknowns, limit_map(cage), FitOptions{.tuning = tuning}, 0, true);
   limit_ = refine_sheets(level_.mesh, limit_refinements(level_.mesh));
 }
 

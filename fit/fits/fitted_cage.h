@@ -21,7 +21,7 @@ inline constexpr std::size_t kChildren = 8;
 class FittedCage {
  public:
   /// cage  hexes with their tags; as for `subdivide`.
-  explicit FittedCage(VolumeMesh cage);
+  explicit FittedCage(VolumeMesh cage, const Tuning& tuning = {});
 
   VolumeMesh cage;  ///< only its positions may change
   const FitLevel& level() const { return level_; }

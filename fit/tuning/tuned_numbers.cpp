@@ -208,14 +208,14 @@ double default_of(std::string_view name) {
 
 /// InputError: the value is out of the range of a number.
 void check_range(std::string_view name, double value, bool is_whole) {
+  constexpr double kLeastTunedShare = 1e-9, kMostTunedShare = 0.99, kLeastTunedFactor = 1.01;
   constexpr double kMostGrowth = 1000;  // larger numbers than so many times the default say nothing
   const double usual = default_of(name);
-  const bool fits = usual < 1 ? value > 0 && value < 1
-                              : value >= 1 && value <= kMostGrowth * usual && (!is_whole || value == std::floor(value));
-  if (fits) return;
-  const std::string range = usual < 1 ? "between 0 and 1" : internal::formatted("from 1 to %.10g", kMostGrowth * usual);
-  throw InputError(internal::formatted("the tuned number %s is %.10g; it must be %s%s", std::string(name).c_str(),
-                                       value, is_whole ? "whole, " : "", range.c_str()));
+  const double least = usual < 1 ? kLeastTunedShare : usual > 1 && !is_whole ? kLeastTunedFactor : 1;
+  const double most = usual < 1 ? kMostTunedShare : kMostGrowth * usual;
+  if (value >= least && value <= most && (!is_whole || value == std::floor(value))) return;
+  throw InputError(internal::formatted("the tuned number %s is %.10g; it must be %sfrom %g to %.10g",
+                                       std::string(name).c_str(), value, is_whole ? "whole, " : "", least, most));
 }
 
 }  // namespace
