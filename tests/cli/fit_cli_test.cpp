@@ -196,7 +196,7 @@ TEST_CASE("Tuned numbers can be set for an experiment", "[cli]") {
     CHECK(!place.has("no.mesh"));
   };
   refused("fitting.coarse=0.02", "there is no tuned number 'fitting.coarse'");
-  refused("fitting.coarse_lambda=2", "it must be between 0 and 1");
+  refused("fitting.coarse_lambda=2", "it must be from 1e-09 to 0.99");
   refused("fitting.coarse_lambda=nan", "must be NAME=VALUE with a number");
   refused("fitting.coarse_lambda", "must be NAME=VALUE with a number");
 }

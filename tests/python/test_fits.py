@@ -170,7 +170,7 @@ class Tuning(InFolder):
 
     def test_unknown_names_and_values_out_of_range_are_refused(self):
         for tune, reason in (({"fitting.coarse": 0.02}, "there is no tuned number 'fitting.coarse'"),
-                             ({"fitting.coarse_lambda": 2}, "must be between 0 and 1")):
+                             ({"fitting.coarse_lambda": 2}, "must be from 1e-09 to 0.99")):
             with self.assertRaisesRegex(subvol.InputError, reason):
                 subvol.fit(*BALL, levels=1, tune=tune)
         for tune in (3, {3: 0.5}, {"fitting.coarse_lambda": "low"}):

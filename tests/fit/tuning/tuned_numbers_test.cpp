@@ -52,11 +52,13 @@ TEST_CASE("Unknown tuned numbers and values out of range are refused", "[tuning]
   CHECK(message_of("fitting.coarse_lambda", 0.5).empty());
   CHECK(message_of("fitting.coarse", 0.5).find("there is no tuned number 'fitting.coarse'") == 0);
   CHECK(message_of("fitting.coarse_lambda", 1) ==
-        "the tuned number fitting.coarse_lambda is 1; it must be between 0 and 1");
+        "the tuned number fitting.coarse_lambda is 1; it must be from 1e-09 to 0.99");
   CHECK(message_of("fitting.hessian_life", 2.5) ==
         "the tuned number fitting.hessian_life is 2.5; it must be whole, from 1 to 4000");
+  CHECK(!message_of("fitting.unfolding_factor", 1).empty());  // lambda would never rise
+  CHECK(message_of("curved.stiff_lambda", 1).empty());
   CHECK(message_of("quality.damping_rise", 0.5) ==
-        "the tuned number quality.damping_rise is 0.5; it must be from 1 to 6000");
+        "the tuned number quality.damping_rise is 0.5; it must be from 1.01 to 6000");
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double bad : {0.0, -1.0, infinity, -infinity, std::nan("")}) {
     CHECK(!message_of("fitting.back_off", bad).empty());
