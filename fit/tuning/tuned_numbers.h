@@ -20,10 +20,9 @@ std::vector<TunedNumber> tuned_numbers(const Tuning& tuning);
 
 /// Sets the number with this name, such as "fitting.coarse_lambda".
 ///
-/// value  from 1e-9 to 0.99 if the default is below 1, since such a number may be a share or a factor that has to
-/// shrink;
-///        from 1.01 to 1000 times the default if that is above 1, since it may be a factor that has to grow; from 1 to
-///        1000 if the default is 1. Numbers that count something are whole, and from 1 to 1000 times the default.
+/// value  If the default is below 1, from 1e-9 to 0.99: the number may be a share or a factor that has to shrink. If it
+///        is above 1, from 1.01 to 1000 times it: the number may be a factor that has to grow. If it is 1, from 1 to
+///        1000. Numbers that count something are whole, and from 1 to 1000 times the default.
 /// InputError: there is no such number, or the value is out of this range; the message names both.
 void set_tuned_number(Tuning& tuning, std::string_view name, double value);
 
