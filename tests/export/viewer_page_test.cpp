@@ -155,7 +155,7 @@ TEST_CASE("A page holds its meshes, and nothing ends its data early", "[viewer]"
   content.target = viewer_surface({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {}});
   const std::string page = viewer_page(content);
   CHECK(page.starts_with("<!DOCTYPE html>"));
-  CHECK(page.find("<title>&lt;/script>&lt;b>") != std::string::npos);
+  CHECK(page.find("<title>&lt;/script&gt;&lt;b&gt;") != std::string::npos);
   const nlohmann::json data = data_of(page);
   CHECK(data["title"].get<std::string>().starts_with("</script><b>"));
   CHECK(data["origin"] == nlohmann::json({1.0, 0.5, 0.5}));
