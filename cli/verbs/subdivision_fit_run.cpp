@@ -100,9 +100,10 @@ void SubdivisionFitRun::load_template() {
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
-    untangle_template(arguments_.template_mesh.path, arguments_.run,
-                      {.control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds}}, template_mesh_,
-                      warnings_);
+    untangle_template(
+        arguments_.template_mesh.path, arguments_.run,
+        {.control = {.time_limit_seconds = arguments_.fit.control.time_limit_seconds}, .tuning = arguments_.fit.tuning},
+        template_mesh_, warnings_);
   made_ = std::move(loaded.made);
   require_regions(outputs_, regions_of(template_mesh_));
   FittedTarget fitted = fitted_target(target_, template_mesh_);
