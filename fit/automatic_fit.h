@@ -155,7 +155,8 @@ struct AutomaticFitResult {
 ///           differs by more than 5 %
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
-/// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.
+/// The weights, the 0.15, the 85 % and the 0.3 are defaults of `AutomaticTuning`. The 0.3 is the quality aimed at if
+/// that is lower. Features whose radius is below the mean tolerance do not count.
 ///
 /// A trial that would be the best one but for a boundary that meets itself or for cells below 0.3 is relaxed there and
 /// judged again: the cells around are minimized with less and less weight of the surface, until they take the room that

@@ -32,7 +32,8 @@ struct CellGroup;
 ///   w_cq ~ w_q (1 + k_c max(0, 1 - s_cq / 0.6)^2),   s_cq = det J / (|J e1| |J e2| |J e3|) (at least 0)
 ///
 /// s_cq is that of the nodes when k was set or the quadrature was last refined. k_c is k; in cells with refined
-/// quadrature it is at least 4, doubled with each further refinement, up to 256.
+/// quadrature it is at least 4, doubled with each further refinement, up to 256. The 0.6 and the 4 are defaults of
+/// `CurvedTuning`.
 ///
 /// With a hinge of weight w_h > 0 and threshold t, low scaled Jacobians cost more, each point as much as any other, so
 /// that corners and edges of cells count as much as their inside:

@@ -42,9 +42,11 @@ struct QualityWeights {
 ///      cosines, lengths count as 5 % of the least h_i or more: as a d_i vanishes, its derivatives stay bounded
 /// h_i  wanted lengths of the cell;  h: their geometric mean
 /// t    the threshold, or the cap of the point if that is lower (`set_caps`)
-/// a_q  1 / number of corners at the corners; 1/16 at other points: the midpoints of edges, faces and cell, or more of
-///      them in cells that were refined (`densify`). A tet has one point only, which stands for all and has a_q = 1. A
-///      pyramid has the points of its base, which stand for the rays to its apex, and its four corners there
+/// a_q  1 / number of corners at the corners; at other points 1/16 by default (`QualityTuning`): the midpoints of
+/// edges,
+///      faces and cell, or more of them in cells that were refined (`densify`). A tet has one point only, which stands
+///      for all and has a_q = 1. A pyramid has the points of its base, which stand for the rays to its apex, and its
+///      four corners there
 /// f    residual of a fold (`BoundaryFolds`); its Hessian is bounded by that of two faces that turn on their own
 /// omega >= 1: emphasis of poor corners, cells and folds (`emphasize_poor`)
 ///
@@ -84,10 +86,11 @@ class QualityEnergy final : public VolumeTerm {
     std::vector<Index> poor{};  ///< cells with a point below its goal, or at a fold, ascending
     std::vector<double> shares{};  ///< least share of each of these
   };
-  /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
-  /// below; elsewhere it falls back by 3 % toward 1. At most 1000. The goal at a cap is lower than the cap by 0.02,
-  /// but at least 0.01; shares of it count as -1 or more. If folds are forbidden, a fold reaches its goal halfway
-  /// between its limit and 360 degrees, and a corner also needs edges of the least length.
+  /// The numbers here are those of `QualityTuning` by default. Multiplies the emphasis of corners below the goal by
+  /// 2.5, and that of all other points of cells with one of them below; elsewhere it falls back by 3 % toward 1. At
+  /// most 1000. The goal at a cap is lower than the cap by 0.02, but at least 0.01; shares of it count as -1 or more.
+  /// If folds are forbidden, a fold reaches its goal halfway between its limit and 360 degrees, and a corner also needs
+  /// edges of the least length.
   State emphasize_poor(std::span<const Vec3> nodes, double goal);
   /// Sets all emphasis to 1.
   void reset_emphasis();

@@ -35,9 +35,10 @@ struct QualityCaps {
 ///   edge    0.93 sin(theta / k),  theta: mean interior angle along its curve;  k: number of cells around it
 ///   corner  0.93 |det(t_1, t_2, t_3)| if it belongs to one cell, t_i: unit directions of its curves;  0.8 otherwise
 ///
-/// 0.93 leaves room for neighbors that are not perfect; sin(theta / k) is that of equal parts, and falls to 0 for parts
-/// of 180 degrees or more. Where the angle is smaller than its curve's mean, the surface does give way a little: with
-/// the angle at each edge, cells at one curve of i10 fell from a scaled Jacobian of 0.61 to 0.32.
+/// 0.93 and 0.8 are defaults of `QualityTuning`. 0.93 leaves room for neighbors that are not perfect; sin(theta / k) is
+/// that of equal parts, and falls to 0 for parts of 180 degrees or more. Where the angle is smaller than its curve's
+/// mean, the surface does give way a little: with the angle at each edge, cells at one curve of i10 fell from a scaled
+/// Jacobian of 0.61 to 0.32.
 /// features  those that were routed. InputError: a path along something that is not an edge of the mesh, or of a curve
 /// that does not exist. Cost: one pass over the mesh.
 QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features, const QualityTuning& tuning = {});

@@ -19,7 +19,7 @@ struct FitSchedule {
   int levels = 0;
   std::vector<Stage> first, middle, last;  ///< stages of level 1, of the levels between, and of the finest level
   Stage continuation;
-  FitTuning tuning;
+  FitTuning tuning;  ///< of the options that the schedule was made for
 
   /// Returns the stages of a level; if there is only one level, those of `first` and `last`.
   std::vector<Stage> stages(int number) const;

@@ -24,7 +24,7 @@ struct HighOrderTry {
 struct HighOrderSchedule {
   std::vector<HighOrderTry> tries;  ///< in this order; a later one is made if those before went wrong (see below)
   double lambda_close = 0;          ///< lambda of the very last stage
-  FitTuning fitting;
+  FitTuning fitting;                ///< of the options that the schedule was made for, as the next
   CurvedTuning curved;
 
   bool far = false;  ///< true if the template is so far away that its cells do not indicate the wanted shapes

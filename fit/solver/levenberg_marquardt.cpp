@@ -21,10 +21,12 @@ constexpr double kMostDamping = 1e4;
 constexpr double kMostLocalDamping = 1e6;  // largest local factor, so that it can fall again within a few steps
 constexpr int kMostTrials = 8;             // of a step, each with a larger mu
 
-/// Return mu after a step that was not taken at once, and after one that was.
+/// Returns mu after a trial that was not taken.
 double raised(double damping, const QualityTuning& tuning) {
   return std::min(kMostDamping, tuning.damping_rise * damping);
 }
+
+/// Returns mu after a step that was taken at once.
 double lowered(double damping, const QualityTuning& tuning) {
   return std::max(tuning.least_damping, tuning.damping_fall * damping);
 }

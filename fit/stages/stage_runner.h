@@ -28,10 +28,9 @@ namespace subvol::internal {
 /// Runs the minimizations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:
+  /// tuning  only its numbers of minimizers are used: the damping of Levenberg-Marquardt, and the stiffening of Newton.
   explicit StageRunner(SolveControl control, SolverKind solver = SolverKind::newton, const Tuning& tuning = {})
       : control_(std::move(control)), solver_(solver), tuning_(tuning) {}
-
-  const Tuning& tuning() const { return tuning_; }
 
   /// Returns a runner with the same limits, callbacks, clock and share of work, but without the log.
   StageRunner without_log() const {

@@ -89,8 +89,9 @@ class MshStream {
 
   TextScanner& scan() { return scan_; }
   const TextScanner& scan() const { return scan_; }
-  /// True for versions 2; for version 4.1, not 4.0.
+  /// Returns true for versions below 3.
   bool is_old() const { return is_old_; }
+  /// Returns true for version 4.1, and false for 4.0.
   bool is_4_1() const { return is_4_1_; }
   bool is_binary() const { return binary_; }
   /// The type of counts, and of tags in version 4.1.
@@ -185,7 +186,7 @@ class MshStream {
   ValueType size_type_ = kUInt64;
 };
 
-/// What a file holds, as its sections say it.
+/// Holds what the parser has read of all sections.
 struct MshContent {
   NodalMesh mesh;                                                    ///< nodes and warnings
   std::unordered_map<std::int64_t, Index> numbers;                   ///< of nodes by their tags

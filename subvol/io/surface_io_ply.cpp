@@ -61,7 +61,7 @@ struct PlyElement {
 /// How the rows of a text are divided: a row holds one element, as the format says, or as many values as fit.
 enum class PlyRows { elements, values };
 
-/// What the header of a file says.
+/// Holds what the header of a file announces.
 struct PlyHeader {
   bool text = true;
   std::endian order = std::endian::little;
