@@ -42,11 +42,10 @@ struct QualityWeights {
 ///      cosines, lengths count as 5 % of the least h_i or more: as a d_i vanishes, its derivatives stay bounded
 /// h_i  wanted lengths of the cell;  h: their geometric mean
 /// t    the threshold, or the cap of the point if that is lower (`set_caps`)
-/// a_q  1 / number of corners at the corners; at other points 1/16 by default (`QualityTuning`): the midpoints of
-/// edges,
-///      faces and cell, or more of them in cells that were refined (`densify`). A tet has one point only, which stands
-///      for all and has a_q = 1. A pyramid has the points of its base, which stand for the rays to its apex, and its
-///      four corners there
+/// a_q  1 / number of corners at the corners; 1/16, by default (`QualityTuning`), at other points: the midpoints of
+///      edges, faces and cell, or more of them in cells that were refined (`densify`). A tet has one point only, which
+///      stands for all and has a_q = 1. A pyramid has the points of its base, which stand for the rays to its apex, and
+///      its four corners there
 /// f    residual of a fold (`BoundaryFolds`); its Hessian is bounded by that of two faces that turn on their own
 /// omega >= 1: emphasis of poor corners, cells and folds (`emphasize_poor`)
 ///
