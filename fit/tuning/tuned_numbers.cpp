@@ -206,13 +206,34 @@ double default_of(std::string_view name) {
   return value;
 }
 
+/// A number whose largest value is less than 1000 times its default.
+struct UpperBound {
+  std::string_view name;
+  double most;
+};
+
+constexpr UpperBound kUpperBounds[] = {
+    {"curved.stiffening_factor", 100},          // with the next bound, up to 1e20 in single precision
+    {"curved.most_stiffenings", 10},            // the power of that factor
+    {"curved.least_intervals_per_order", 20},   // at order 16, 320 times 320 samples of a face
+    {"curved.most_points_per_direction", 100},  // 1e6 points in a cell
+    {"quality.least_fold_limit", 359},          // an angle, which no fold exceeds
+};
+
+/// Returns the largest value of a number whose default is 1 or more.
+double upper_bound_of(std::string_view name, double usual) {
+  constexpr double kMostGrowth = 1000;  // larger numbers than so many times the default say nothing
+  for (const UpperBound& bound : kUpperBounds)
+    if (bound.name == name) return bound.most;
+  return kMostGrowth * usual;
+}
+
 /// InputError: the value is out of the range of a number.
 void check_range(std::string_view name, double value, bool is_whole) {
   constexpr double kLeastTunedShare = 1e-9, kMostTunedShare = 0.99, kLeastTunedFactor = 1.01;
-  constexpr double kMostGrowth = 1000;  // larger numbers than so many times the default say nothing
   const double usual = default_of(name);
   const double least = usual < 1 ? kLeastTunedShare : usual > 1 && !is_whole ? kLeastTunedFactor : 1;
-  const double most = usual < 1 ? kMostTunedShare : kMostGrowth * usual;
+  const double most = usual < 1 ? kMostTunedShare : upper_bound_of(name, usual);
   if (value >= least && value <= most && (!is_whole || value == std::floor(value))) return;
   throw InputError(internal::formatted("the tuned number %s is %.10g; it must be %sfrom %g to %.10g",
                                        std::string(name).c_str(), value, is_whole ? "whole, " : "", least, most));

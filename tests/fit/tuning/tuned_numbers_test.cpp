@@ -59,6 +59,12 @@ TEST_CASE("Unknown tuned numbers and values out of range are refused", "[tuning]
   CHECK(message_of("curved.stiff_lambda", 1).empty());
   CHECK(message_of("quality.damping_rise", 0.5) ==
         "the tuned number quality.damping_rise is 0.5; it must be from 1.01 to 6000");
+  // Points stiffened in single precision must not overflow, and no fold exceeds a full turn.
+  CHECK(message_of("curved.most_stiffenings", 10).empty());
+  CHECK(message_of("curved.most_stiffenings", 11) ==
+        "the tuned number curved.most_stiffenings is 11; it must be whole, from 1 to 10");
+  CHECK(!message_of("curved.stiffening_factor", 101).empty());
+  CHECK(!message_of("quality.least_fold_limit", 360).empty());
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double bad : {0.0, -1.0, infinity, -infinity, std::nan("")}) {
     CHECK(!message_of("fitting.back_off", bad).empty());
